@@ -1,0 +1,1 @@
+"""Change: alignment, differences, volumes and their uncertainty."""

@@ -1,0 +1,83 @@
+"""Files that are whole or absent: a temporary name, then a rename."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from .contract import encode
+
+PART = ".part-"  # marks what is not finished; whoever holds the survey may remove it
+
+
+@contextmanager
+def whole(path: Path | str) -> Iterator[Path]:
+    """Yield a temporary path beside ``path`` (same suffix); it replaces ``path`` on success and is removed on failure.
+
+    The body may make a file or a folder there. A folder replaces the folder that stood at ``path``.
+    """
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.with_name(f"{PART}{os.getpid()}-{target.name}")
+    remove(part)
+    try:
+        yield part
+        if part.is_dir() and target.is_dir():
+            old = target.with_name(f"{PART}{os.getpid()}-old-{target.name}")
+            target.rename(old)
+            part.rename(target)
+            remove(old)
+        else:
+            _sync(part)
+            part.replace(target)
+    except BaseException:
+        remove(part)
+        raise
+
+
+def write_json(path: Path | str, data: Any) -> None:
+    """Write ``data`` (JSON data or dataclasses) to ``path``, whole or not at all."""
+    with whole(path) as part:
+        part.write_text(json.dumps(encode(data), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def remove(path: Path) -> None:
+    """Remove a file or folder if it exists."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove what killed runs left unfinished directly in ``folder``; put back a folder caught between two renames."""
+    for path in folder.glob(f"{PART}*"):
+        _, _, name = path.name.partition("-old-")
+        if name and not (folder / name).exists():
+            path.rename(folder / name)
+        else:
+            remove(path)
+
+
+def digest(*values: Any) -> str:
+    """Return a fingerprint (32 hex digits) of JSON data."""
+    text = json.dumps(encode(values), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def file_digest(path: Path | str) -> str:
+    """Return a fingerprint (32 hex digits) of a file's content."""
+    with Path(path).open("rb") as stream:
+        return hashlib.file_digest(stream, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+
+
+def _sync(path: Path) -> None:
+    if path.is_file():
+        with path.open("rb+") as stream:
+            os.fsync(stream.fileno())

@@ -1,0 +1,1 @@
+"""Photographs: reading them, their EXIF and XMP, and the local contrast enhancement."""

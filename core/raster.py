@@ -1,0 +1,194 @@
+"""Rasters on disk. This module alone knows rasterio.
+
+Arrays are float32 or uint8 with rows from north to south; NaN is "no value" and becomes a declared nodata value on disk.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rasterio
+import rasterio.shutil
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+from rasterio.enums import Resampling
+from rasterio.transform import Affine
+from rasterio.windows import Window
+
+from .errors import InputError
+from .files import whole
+
+NODATA = -9999.0
+_BLOCK = 512
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A north-up grid with square cells: the west and north edges (m), the cell size (m), its size, its CRS (WKT2)."""
+
+    west: float
+    north: float
+    cell: float
+    width: int
+    height: int
+    crs: str
+
+    @property
+    def transform(self) -> Affine:
+        """The affine from column, row (corners) to easting, northing."""
+        return Affine(self.cell, 0.0, self.west, 0.0, -self.cell, self.north)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """West, south, east, north."""
+        return self.west, self.north - self.height * self.cell, self.west + self.width * self.cell, self.north
+
+    def window(self, column: int, row: int, width: int, height: int) -> Grid:
+        """Return the part of the grid that starts at ``column``, ``row``."""
+        west, north = self.west + column * self.cell, self.north - row * self.cell
+        return Grid(west, north, self.cell, width, height, self.crs)
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A rectangle of values (bands, rows, columns) whose top-left cell is at ``column``, ``row`` of the grid."""
+
+    column: int
+    row: int
+    values: NDArray[Any]
+
+
+def check_destination(path: str) -> None:
+    """Refuse, before any work, a raster that could not be written.
+
+    Raises
+    ------
+    InputError
+        When the name does not end in .tif or its folder cannot be written to.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in (".tif", ".tiff"):
+        raise InputError(f"The raster {path} must be a GeoTIFF: give a name that ends in .tif.")
+    folder = target.parent
+    while not folder.exists():
+        folder = folder.parent
+    if not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise InputError(f"The raster {path} cannot be written: choose a folder you may write to.")
+
+
+class CogWriter:
+    """Collects patches of one raster on disk and makes a cloud-optimised GeoTIFF of them; memory stays at a block.
+
+    Use as a context manager: on success the finished raster replaces ``path``, otherwise nothing is left behind.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        grid: Grid,
+        *,
+        dtype: str = "float32",
+        bands: int = 1,
+        names: tuple[str, ...] = (),
+        tags: dict[str, str] | None = None,
+    ) -> None:
+        check_destination(path)
+        self._path, self._grid, self._dtype, self._bands = path, grid, dtype, bands
+        self._names, self._tags = names, tags or {}
+
+    def __enter__(self) -> CogWriter:
+        """Open the collecting file."""
+        self._whole = whole(self._path)
+        self._part = self._whole.__enter__()
+        self._raw = self._part.with_name(self._part.name + ".raw.tif")
+        # An RGB image is masked by a fourth band; values carry nodata.
+        extra = {"nodata": NODATA} if self._dtype == "float32" else {}
+        self._file = rasterio.open(
+            self._raw,
+            "w",
+            driver="GTiff",
+            width=self._grid.width,
+            height=self._grid.height,
+            count=self._bands,
+            dtype=self._dtype,
+            crs=CRS.from_wkt(self._grid.crs),
+            transform=self._grid.transform,
+            tiled=True,
+            blockxsize=_BLOCK,
+            blockysize=_BLOCK,
+            compress="zstd",
+            zstd_level=1,
+            bigtiff="if_safer",
+            **extra,
+        )
+        if self._dtype == "float32":
+            _fill(self._file)
+        return self
+
+    def write(self, patch: Patch) -> None:
+        """Put a patch in its place; NaN becomes nodata."""
+        values = patch.values
+        if self._dtype == "float32":
+            values = np.where(np.isnan(values), np.float32(NODATA), values).astype(np.float32)
+        self._file.write(values, window=Window(patch.column, patch.row, values.shape[2], values.shape[1]))
+
+    def read(self, column: int, row: int, width: int, height: int) -> NDArray[Any]:
+        """Return what has been collected in a window (bands, rows, columns), nodata as it is on disk."""
+        return np.asarray(self._file.read(window=Window(column, row, width, height)))
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        """Finish the raster, or remove what was collected."""
+        try:
+            if kind is None:
+                for band, name in enumerate(self._names, start=1):
+                    self._file.set_band_description(band, name)
+                self._file.update_tags(AREA_OR_POINT="Area", **self._tags)
+                if self._bands == 4:
+                    self._file.colorinterp = tuple(
+                        getattr(rasterio.enums.ColorInterp, c) for c in ("red", "green", "blue", "alpha")
+                    )
+            self._file.close()
+            if kind is None:
+                self._finish()
+        except BaseException as failure:
+            self._raw.unlink(missing_ok=True)
+            self._whole.__exit__(type(failure), failure, failure.__traceback__)
+            raise
+        self._raw.unlink(missing_ok=True)
+        self._whole.__exit__(kind, error, trace)
+
+    def _finish(self) -> None:
+        floating = self._dtype == "float32"
+        rasterio.shutil.copy(
+            self._raw,
+            self._part,
+            driver="COG",
+            compress="deflate",
+            predictor="yes",
+            blocksize=_BLOCK,
+            overview_resampling="average",
+            bigtiff="if_safer",
+            num_threads=1,
+            **({"nodata": NODATA} if floating else {}),
+        )
+
+
+def write_cog(path: str, grid: Grid, patches: Iterable[Patch], **options: Any) -> None:
+    """Write ``patches`` as one raster; ``options`` are CogWriter's."""
+    with CogWriter(path, grid, **options) as writer:
+        for patch in patches:
+            writer.write(patch)
+
+
+def _fill(file: Any) -> None:
+    for _, window in file.block_windows(1):
+        shape = (file.count, int(window.height), int(window.width))
+        file.write(np.full(shape, NODATA, np.float32), window=window)
+
+
+__all__ = ["NODATA", "CogWriter", "Grid", "Patch", "Resampling", "check_destination", "write_cog"]

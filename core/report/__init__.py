@@ -1,0 +1,1 @@
+"""Step reports: self-contained HTML with pictures, no network."""

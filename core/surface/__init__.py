@@ -1,0 +1,1 @@
+"""The dense surface: correlation in ground geometry, regularisation, DSM and orthophoto."""

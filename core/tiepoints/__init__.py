@@ -1,0 +1,1 @@
+"""Tie points: features, pairs, matching, statistics."""
