@@ -10,7 +10,10 @@ from ..progress import SILENT, Progress
 
 @dataclass(frozen=True)
 class Request:
-    """``resolution`` in metres (0 = two ground pixels), ``window`` in cells (0 = adaptive), ``fill`` in m2; outputs are files to write."""
+    """``resolution`` in metres (0 = two ground pixels), ``window`` in cells (0 = adaptive), ``fill`` in m2.
+
+    The outputs are files to write.
+    """
 
     survey: str
     output: str

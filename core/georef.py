@@ -1,0 +1,52 @@
+"""What ``georeference`` leaves in the survey for the surface: the frame of georeferenced/ and its accuracy."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+
+from .contract import decode
+from .errors import InputError
+from .files import write_json
+from .frames import LocalFrame
+from .survey import Survey
+
+FOLDER = "georeferenced"
+_FILE = "georef.json"
+
+
+@dataclass(frozen=True)
+class Georef:
+    """The local frame of the georeferenced block.
+
+    ``similarity`` holds scale, the rotation's nine numbers row by row, and the shift: ``x_local = s R x_model + t``.
+    ``covariance`` (7x7, row by row, of the shift E N U (m), rotations about E N U (rad) and the scale, about the block's ``pivot`` in the
+    local frame) is the georeferencing's own uncertainty, common to all that is measured in the block; empty when not known.
+    ``accuracy`` repeats the step's numbers by name.
+    """
+
+    frame: LocalFrame
+    method: str
+    similarity: tuple[float, ...]
+    pivot: tuple[float, ...] = ()
+    covariance: tuple[float, ...] = ()
+    accuracy: dict[str, float | None] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, survey: Survey) -> Georef:
+        """Read it from the survey folder.
+
+        Raises
+        ------
+        InputError
+            When it is missing or damaged.
+        """
+        path = survey.folder / _FILE
+        try:
+            return decode(cls, json.loads(path.read_text(encoding="utf-8")))
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path} cannot be read ({error}): run strandline:georeference again.") from error
+
+    def write(self, survey: Survey) -> None:
+        """Write it into the survey folder."""
+        write_json(survey.folder / _FILE, self)
