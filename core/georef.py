@@ -20,8 +20,8 @@ class Georef:
     """The local frame of the georeferenced block.
 
     ``similarity`` holds scale, the rotation's nine numbers row by row, and the shift: ``x_local = s R x_model + t``.
-    ``covariance`` (7x7, row by row, of the shift E N U (m), rotations about E N U (rad) and the scale, about the block's ``pivot`` in the
-    local frame) is the georeferencing's own uncertainty, common to all that is measured in the block; empty when not known.
+    ``covariance`` (7x7, row by row: shift E N U in m, rotations about E N U in rad, scale; about the block's ``pivot`` in
+    the local frame) is the georeferencing's own uncertainty, common to all that is measured in the block; empty when not known.
     ``accuracy`` repeats the step's numbers by name.
     """
 
