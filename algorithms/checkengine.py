@@ -1,0 +1,139 @@
+"""Check engine: prove that the engine works, or install it."""
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Dict, Iterable, Optional, Tuple
+
+from qgis.core import (
+    QgsProcessingAlgorithm,
+    QgsProcessingContext,
+    QgsProcessingException,
+    QgsProcessingFeedback,
+    QgsProcessingOutputBoolean,
+    QgsProcessingOutputDefinition,
+    QgsProcessingParameterDefinition,
+)
+
+from ..bridge import install
+from ..bridge.child import Cancelled, Child
+from ..bridge.door import EngineError, run_step
+from ..bridge.engine import MissingEngine, base_python, find_python, install_folder
+from ..bridge.environment import cleaned
+from ..bridge.request import Values
+from ..i18n import tr
+from . import parameters as ask
+from .base import StepAlgorithm
+
+
+class CheckEngine(StepAlgorithm):
+    """The algorithm ``strandline:checkengine``."""
+
+    def name(self) -> str:
+        """Return the id."""
+        return "checkengine"
+
+    def displayName(self) -> str:
+        """Return the name shown."""
+        return tr("Check engine")
+
+    def group(self) -> str:
+        """Return the group shown."""
+        return tr("Tools")
+
+    def groupId(self) -> str:
+        """Return the group's id."""
+        return "tools"
+
+    def shortHelpString(self) -> str:
+        """Return what the algorithm does."""
+        return tr(
+            "Tells whether the engine, the Python environment in which Strandline computes, is complete. With 'Install' it is "
+            "made first: a virtual environment of about 1 GB in the QGIS profile, from the versions that Strandline was "
+            "tested with. Nothing else in Strandline downloads anything."
+        )
+
+    def flags(self) -> QgsProcessingAlgorithm.Flag:
+        """Keep it out of models: it prepares a computer, not data."""
+        return super().flags() | QgsProcessingAlgorithm.Flag.FlagHideFromModeler
+
+    def canExecute(self) -> Tuple[bool, str]:
+        """Always: a missing engine is what it tells about."""
+        return True, ""
+
+    def parameters(self) -> Iterable[QgsProcessingParameterDefinition]:
+        """Return the parameters."""
+        yield ask.switch("INSTALL", tr("Install"), tr("Install or complete the engine before checking it."), default=False)
+        yield ask.file(
+            "PYTHON",
+            tr("Python to use"),
+            tr("A Python of at least 3.11 to make a new environment with. Empty: one is looked for on this computer."),
+        )
+        yield ask.folder(
+            "WHEELS",
+            tr("Folder of wheels"),
+            tr("Install from the Python packages in this folder instead of the network, for computers without one."),
+            optional=True,
+        )
+
+    def outputs(self) -> Iterable[QgsProcessingOutputDefinition]:
+        """Return the verdict."""
+        yield QgsProcessingOutputBoolean("READY", tr("The engine is ready"))
+
+    def processAlgorithm(
+        self, parameters: Values, context: QgsProcessingContext, feedback: QgsProcessingFeedback
+    ) -> Dict[str, Any]:
+        """Install when asked, then let the engine check itself."""
+        try:
+            if self.parameterAsBool(parameters, "INSTALL", context):
+                python = self.parameterAsFile(parameters, "PYTHON", context)
+                wheels = self.parameterAsFile(parameters, "WHEELS", context)
+                self._install(python or None, Path(wheels) if wheels else None, feedback)
+            result = run_step(find_python(), self.name(), {}, feedback)
+        except Cancelled as error:
+            raise QgsProcessingException(tr("Cancelled.")) from error
+        except (EngineError, MissingEngine) as error:
+            if self.parameterAsBool(parameters, "INSTALL", context):
+                raise QgsProcessingException(str(error)) from error
+            feedback.reportError(str(error))
+            return {"READY": False}
+        packages = ", ".join(f"{name} {version}" for name, version in result["packages"].items())
+        feedback.pushInfo(tr("The engine is ready: Python {}, {}.").format(result["python"], packages))
+        return {"READY": result["ready"]}
+
+    def _install(self, python: Optional[str], wheels: Optional[Path], feedback: QgsProcessingFeedback) -> None:
+        base, folder = base_python(python), install_folder()
+        feedback.pushInfo(tr("Installing the engine in {} with {}.").format(folder, base))
+        steps = _Steps(feedback)
+        install.make(folder, base, steps.call, wheels=wheels, fresh=python is not None)
+
+
+class _Steps:
+    """Runs the installation's commands, showing what they print and how far they are."""
+
+    _EXPECTED = 45  # packages with what they need; only the progress bar hangs on it
+
+    def __init__(self, feedback: QgsProcessingFeedback) -> None:
+        self._feedback, self._seen = feedback, 0
+
+    def call(self, command: Sequence[str]) -> None:
+        """Run ``command``.
+
+        Raises
+        ------
+        EngineError
+            When it fails.
+        Cancelled
+            When the user asked to stop.
+        """
+        last = ""
+        with Child(command, cleaned(os.environ)) as child:
+            for line in child.lines(self._feedback):
+                self._feedback.pushInfo(line)
+                last = line if line.strip() else last
+                self._seen += bool(re.match(r"(Collecting|Processing) ", line))
+                done = 0.95 if line.startswith("Successfully installed") else min(self._seen / self._EXPECTED, 1.0) * 0.8
+                self._feedback.setProgress(100.0 * done)
+            if child.wait(self._feedback) != 0:
+                raise EngineError(tr("The engine could not be installed: {} (see the lines above).").format(last or command[0]))

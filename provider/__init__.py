@@ -1,0 +1,1 @@
+"""The QGIS face of Strandline: plugin, provider, options."""

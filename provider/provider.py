@@ -1,0 +1,35 @@
+"""The Processing provider ``strandline``."""
+
+from qgis.core import QgsProcessingProvider
+from qgis.PyQt.QtGui import QIcon
+
+from ..algorithms.checkengine import CheckEngine
+from ..algorithms.createsurvey import CreateSurvey
+from ..bridge.engine import ROOT
+
+ALGORITHMS = (CreateSurvey, CheckEngine)
+
+
+class StrandlineProvider(QgsProcessingProvider):
+    """Offers Strandline's algorithms to the toolbox, the modeller, scripts and qgis_process."""
+
+    def id(self) -> str:
+        """Return the id, which saved models hold."""
+        return "strandline"
+
+    def name(self) -> str:
+        """Return the name shown."""
+        return "Strandline"
+
+    def icon(self) -> QIcon:
+        """Return the icon."""
+        return QIcon(str(ROOT / "icon.svg"))
+
+    def svgIconPath(self) -> str:
+        """Return the icon's file."""
+        return str(ROOT / "icon.svg")
+
+    def loadAlgorithms(self) -> None:
+        """Add the algorithms."""
+        for algorithm in ALGORITHMS:
+            self.addAlgorithm(algorithm())
