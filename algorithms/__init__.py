@@ -1,1 +1,23 @@
 """The Processing algorithms, one file each, named after the id."""
+
+from .checkengine import CheckEngine
+from .createsurvey import CreateSurvey
+from .dsmdifference import DsmDifference
+from .enhance import Enhance
+from .exportdsm import ExportDsm
+from .georeference import Georeference
+from .orient import Orient
+from .simulatesurvey import SimulateSurvey
+from .tiepoints import TiePoints
+
+ALGORITHMS = (
+    CreateSurvey,
+    Enhance,
+    TiePoints,
+    Orient,
+    Georeference,
+    ExportDsm,
+    DsmDifference,
+    SimulateSurvey,
+    CheckEngine,
+)

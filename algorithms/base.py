@@ -3,7 +3,7 @@
 import shutil
 import tempfile
 from pathlib import Path
-from typing import Any, Dict, Iterable, Optional, Tuple
+from typing import Any, Dict, Iterable, NamedTuple, Optional, Tuple
 
 from qgis.core import (
     QgsProcessingAlgorithm,
@@ -24,6 +24,20 @@ from ..i18n import tr
 from .styles import Style
 
 
+class About(NamedTuple):
+    """An algorithm's id, its group's id, and its words."""
+
+    id: str
+    group: str
+    title: str
+    text: str
+
+
+def group_title(group: str) -> str:
+    """Return the group's name as the toolbox shows it; the numbers keep the order of the work."""
+    return {"survey": tr("1 Survey"), "surface": tr("2 Surface"), "change": tr("3 Change"), "tools": tr("Tools")}[group]
+
+
 class StepAlgorithm(QgsProcessingAlgorithm):
     """A step of the engine as an algorithm; a subclass states its parameters, outputs, words and styles.
 
@@ -32,6 +46,10 @@ class StepAlgorithm(QgsProcessingAlgorithm):
 
     #: How results are drawn when QGIS loads them, by output key.
     STYLES: Dict[str, Style] = {}
+
+    def about(self) -> About:
+        """Return what the algorithm is called and does."""
+        raise NotImplementedError
 
     def parameters(self) -> Iterable[QgsProcessingParameterDefinition]:
         """Return the parameters, in the order of the dialog."""
@@ -47,6 +65,26 @@ class StepAlgorithm(QgsProcessingAlgorithm):
             self.addParameter(parameter)
         for output in self.outputs():
             self.addOutput(output)
+
+    def name(self) -> str:
+        """Return the id."""
+        return self.about().id
+
+    def displayName(self) -> str:
+        """Return the name shown."""
+        return self.about().title
+
+    def groupId(self) -> str:
+        """Return the group's id."""
+        return self.about().group
+
+    def group(self) -> str:
+        """Return the group's name."""
+        return group_title(self.about().group)
+
+    def shortHelpString(self) -> str:
+        """Return what the algorithm does."""
+        return self.about().text
 
     def createInstance(self) -> "StepAlgorithm":
         """Return a new algorithm of this kind."""
@@ -73,9 +111,7 @@ class StepAlgorithm(QgsProcessingAlgorithm):
                 return False, tr("{} is not a survey folder: make one with 'Create survey'.").format(survey)
         return fine, told
 
-    def prepareAlgorithm(
-        self, parameters: Values, context: QgsProcessingContext, feedback: QgsProcessingFeedback
-    ) -> bool:
+    def prepareAlgorithm(self, parameters: Values, context: QgsProcessingContext, feedback: QgsProcessingFeedback) -> bool:
         """Look at the rasters while layers may be touched."""
         try:
             self._rasters = rasters(self, parameters, context)

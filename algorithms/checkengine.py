@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, Dict, Iterable, Optional, Tuple
 
 from qgis.core import (
-    QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingException,
     QgsProcessingFeedback,
@@ -24,42 +23,27 @@ from ..bridge.environment import cleaned
 from ..bridge.request import Values
 from ..i18n import tr
 from . import parameters as ask
-from .base import StepAlgorithm
+from .base import About, StepAlgorithm
 
 
 class CheckEngine(StepAlgorithm):
     """The algorithm ``strandline:checkengine``."""
 
-    def name(self) -> str:
-        """Return the id."""
-        return "checkengine"
-
-    def displayName(self) -> str:
-        """Return the name shown."""
-        return tr("Check engine")
-
-    def group(self) -> str:
-        """Return the group shown."""
-        return tr("Tools")
-
-    def groupId(self) -> str:
-        """Return the group's id."""
-        return "tools"
-
-    def shortHelpString(self) -> str:
-        """Return what the algorithm does."""
-        return tr(
-            "Tells whether the engine, the Python environment in which Strandline computes, is complete. With 'Install' it is "
-            "made first: a virtual environment of about 1 GB in the QGIS profile, from the versions that Strandline was "
-            "tested with. Nothing else in Strandline downloads anything."
+    def about(self) -> About:
+        """Return what the algorithm is called and does."""
+        return About(
+            "checkengine",
+            "tools",
+            tr("Check engine"),
+            tr(
+                "Tells whether the engine, the Python environment in which Strandline computes, is complete. With 'Install' it "
+                "is made first: a virtual environment of about 1 GB in the QGIS profile, from the versions that Strandline was "
+                "tested with. Nothing else in Strandline downloads anything."
+            ),
         )
 
-    def flags(self) -> QgsProcessingAlgorithm.Flag:
-        """Keep it out of models: it prepares a computer, not data."""
-        return super().flags() | QgsProcessingAlgorithm.Flag.FlagHideFromModeler
-
     def canExecute(self) -> Tuple[bool, str]:
-        """Always: a missing engine is what it tells about."""
+        """Say yes: a missing engine is what it tells about."""
         return True, ""
 
     def parameters(self) -> Iterable[QgsProcessingParameterDefinition]:

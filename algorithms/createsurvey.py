@@ -14,34 +14,23 @@ from qgis.core import (
 from ..bridge.request import Values
 from ..i18n import tr
 from . import parameters as ask
-from .base import StepAlgorithm
+from .base import About, StepAlgorithm
 
 
 class CreateSurvey(StepAlgorithm):
     """The algorithm ``strandline:createsurvey``."""
 
-    def name(self) -> str:
-        """Return the id."""
-        return "createsurvey"
-
-    def displayName(self) -> str:
-        """Return the name shown."""
-        return tr("Create survey")
-
-    def group(self) -> str:
-        """Return the group shown."""
-        return tr("1 Survey")
-
-    def groupId(self) -> str:
-        """Return the group's id."""
-        return "survey"
-
-    def shortHelpString(self) -> str:
-        """Return what the algorithm does."""
-        return tr(
-            "Makes a survey folder for the photographs of one flight: reads size, camera, time and GNSS position from each "
-            "file, and chooses the CRS. The photographs stay where they are and are never changed. Every later step takes "
-            "this folder and adds its own files to it."
+    def about(self) -> About:
+        """Return what the algorithm is called and does."""
+        return About(
+            "createsurvey",
+            "survey",
+            tr("Create survey"),
+            tr(
+                "Makes a survey folder for the photographs of one flight: reads size, camera, time and GNSS position from each "
+                "file, and chooses the CRS. The photographs stay where they are and are never changed. Every later step takes "
+                "this folder and adds its own files to it."
+            ),
         )
 
     def parameters(self) -> Iterable[QgsProcessingParameterDefinition]:

@@ -51,9 +51,9 @@ def switch(key: str, label: str, text: str, *, default: bool) -> _Parameter:
     return explained(QgsProcessingParameterBoolean(key, label, default), text)
 
 
-def choice(key: str, label: str, text: str, options: Sequence[str]) -> _Parameter:
-    """Return a choice among static strings; the first is the default."""
-    return explained(QgsProcessingParameterEnum(key, label, list(options), False, options[0], False, True), text)
+def choice(key: str, label: str, text: str, options: Sequence[str], *, default: str) -> _Parameter:
+    """Return a choice among static strings."""
+    return explained(QgsProcessingParameterEnum(key, label, list(options), False, default, False, True), text)
 
 
 def integer(key: str, label: str, text: str, *, default: int, least: int = 0) -> _Parameter:
@@ -63,7 +63,13 @@ def integer(key: str, label: str, text: str, *, default: int, least: int = 0) ->
 
 
 def number(
-    key: str, label: str, text: str, *, default: Optional[float] = None, least: Optional[float] = 0.0, most: Optional[float] = None
+    key: str,
+    label: str,
+    text: str,
+    *,
+    default: Optional[float] = None,
+    least: Optional[float] = 0.0,
+    most: Optional[float] = None,
 ) -> _Parameter:
     """Return a number, optional when it has no default."""
     kind = QgsProcessingParameterNumber.Type.Double
@@ -170,7 +176,9 @@ def polygon_output(key: str, label: str, text: str) -> _Parameter:
 
 def report() -> _Parameter:
     """Return the step's report."""
-    text = tr("A page with the step's numbers and pictures, to keep or send. One is always written to the survey's report folder.")
+    text = tr(
+        "A page with the step's numbers and pictures, to keep or send. One is always written to the survey's report folder."
+    )
     return file_output("OUTPUT_HTML_FILE", tr("Report"), text, filters=tr("HTML files (*.html)"), by_default=True)
 
 

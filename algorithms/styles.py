@@ -88,7 +88,7 @@ def _difference(layer: QgsRasterLayer) -> None:
 
 
 def _arrows(layer: QgsVectorLayer) -> None:
-    """A dot per point and an arrow for its residual in plan (fields dx, dy), the longest about a centimetre long."""
+    """Draw a dot per point and an arrow for its residual in plan (fields dx, dy), the longest a centimetre long."""
     places = [layer.fields().lookupField(name) for name in ("dx", "dy")]
     if min(places) < 0:
         return

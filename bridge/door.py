@@ -12,8 +12,8 @@ from typing import Any, Dict, List
 
 from ..i18n import tr
 from .child import Cancelled, Child
-from .environment import cleaned
 from .engine import ROOT
+from .environment import cleaned
 
 __all__ = ["Cancelled", "EngineError", "run_step"]
 

@@ -36,7 +36,9 @@ class OptionsPage(QgsOptionsPageWidget):
         self._python.lineEdit().setPlaceholderText(tr("the one that 'Check engine' installs"))
         self._scheduler = QLineEdit(settings.read(settings.SCHEDULER))
         self._scheduler.setPlaceholderText(tr("none: this computer"))
-        told = QLabel(tr("Strandline computes in a Python of its own. Run 'Check engine' from the toolbox to install or test it."))
+        told = QLabel(
+            tr("Strandline computes in a Python of its own. Run 'Check engine' from the toolbox to install or test it.")
+        )
         told.setWordWrap(True)
         form = QFormLayout(self)
         form.addRow(told)

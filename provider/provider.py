@@ -3,11 +3,8 @@
 from qgis.core import QgsProcessingProvider
 from qgis.PyQt.QtGui import QIcon
 
-from ..algorithms.checkengine import CheckEngine
-from ..algorithms.createsurvey import CreateSurvey
+from ..algorithms import ALGORITHMS
 from ..bridge.engine import ROOT
-
-ALGORITHMS = (CreateSurvey, CheckEngine)
 
 
 class StrandlineProvider(QgsProcessingProvider):

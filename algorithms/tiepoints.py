@@ -1,0 +1,68 @@
+"""Tie points: features, pairs and verified matches."""
+
+from collections.abc import Iterable
+
+from qgis.core import QgsProcessingOutputDefinition, QgsProcessingParameterDefinition
+
+from ..i18n import tr
+from . import parameters as ask
+from .base import About, StepAlgorithm
+
+
+class TiePoints(StepAlgorithm):
+    """The algorithm ``strandline:tiepoints``."""
+
+    def about(self) -> About:
+        """Return what the algorithm is called and does."""
+        return About(
+            "tiepoints",
+            "survey",
+            tr("Find tie points"),
+            tr(
+                "Finds features in the photographs and matches them between overlapping ones. The matches that agree with one "
+                "geometry are kept in features.db, a COLMAP database."
+            ),
+        )
+
+    def parameters(self) -> Iterable[QgsProcessingParameterDefinition]:
+        """Return the parameters."""
+        yield ask.survey()
+        yield ask.choice(
+            "SOURCE",
+            tr("Images"),
+            tr("auto: the enhanced images if they exist, else the originals with a warning; enhanced; original."),
+            ("auto", "enhanced", "original"),
+            default="auto",
+        )
+        yield ask.integer(
+            "MAX_FEATURES",
+            tr("Most features per photograph"),
+            tr("The strongest features are kept, this many of each photograph; 0 is no limit."),
+            default=20000,
+        )
+        yield ask.integer(
+            "MAX_SIZE",
+            tr("Longest side"),
+            tr("Photographs are reduced to this many pixels on their longer side before features are sought; 0 is full size."),
+            default=0,
+        )
+        yield ask.choice(
+            "PAIRS",
+            tr("Pairs"),
+            tr(
+                "auto: neighbours by position, or by order and likeness when there are no positions; exhaustive: every pair; "
+                "sequential: neighbours in the order of the flight."
+            ),
+            ("auto", "exhaustive", "sequential"),
+            default="auto",
+        )
+        yield ask.workers()
+        yield ask.scheduler()
+        yield ask.report()
+
+    def outputs(self) -> Iterable[QgsProcessingOutputDefinition]:
+        """Return the survey and the counts."""
+        yield ask.survey_result()
+        yield ask.result("MEAN_FEATURES", tr("Mean features per photograph"))
+        yield ask.result("PAIR_COUNT", tr("Verified pairs"))
+        yield ask.result("MATCH_COUNT", tr("Verified matches"))
