@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -128,6 +129,22 @@ def polygons(source: VectorSource, crs: str) -> list[Any]:
     return shapes
 
 
+def check_destination(path: str) -> None:
+    """Refuse, before any work, a layer that could not be written.
+
+    Raises
+    ------
+    InputError
+        When the name does not end in .gpkg or its folder cannot be written to.
+    """
+    target = Path(path)
+    if target.suffix.lower() != ".gpkg":
+        raise InputError(f"The layer {path} must be a GeoPackage: give a name that ends in .gpkg.")
+    folder = next((f for f in target.absolute().parents if f.exists()), target)
+    if target.is_dir() or not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise InputError(f"The layer {path} cannot be written: choose a folder you may write to.")
+
+
 def write_layer(
     path: str,
     layer: str,
@@ -135,10 +152,13 @@ def write_layer(
     fields: Mapping[str, Sequence[Any] | NDArray[Any]],
     geometry: Sequence[Any] | None,
     kind: str = "Point",
+    *,
+    modified: str | None = None,
 ) -> None:
     """Write a GeoPackage layer; None in ``fields`` becomes NULL. ``kind`` is "Point", "Point Z", "MultiPolygon" ...
 
-    A column of numbers with None in it is float; of text, text. A column of nothing but None is float.
+    A column of numbers with None in it is float; of text, text. A column of nothing but None is float. ``modified`` (such as
+    "2024-01-01T00:00:00.000Z") is noted in the file in place of the time, for files that are to be the same every time.
     """
     names, data, masks = list(fields), [], []
     for values in fields.values():
@@ -146,6 +166,7 @@ def write_layer(
         data.append(column)
         masks.append(mask)
     with whole(path) as part:
+        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": modified})
         pyogrio.raw.write(
             part,
             geometry=None if geometry is None else np.asarray(shapely.to_wkb(np.asarray(geometry, object), flavor="iso")),
