@@ -22,7 +22,8 @@ class Georef:
     ``similarity`` holds scale, the rotation's nine numbers row by row, and the shift: ``x_local = s R x_model + t``.
     ``covariance`` (7x7, row by row: shift E N U in m, rotations about E N U in rad, scale; about the block's ``pivot`` in
     the local frame) is the georeferencing's own uncertainty, common to all that is measured in the block; empty when not known.
-    ``accuracy`` repeats the step's numbers by name.
+    ``accuracy`` repeats the step's numbers by name. ``heights`` says what the block's heights stand on: "ellipsoidal",
+    "orthometric" or "unknown".
     """
 
     frame: LocalFrame
@@ -31,6 +32,7 @@ class Georef:
     pivot: tuple[float, ...] = ()
     covariance: tuple[float, ...] = ()
     accuracy: dict[str, float | None] = field(default_factory=dict)
+    heights: str = "unknown"
 
     @classmethod
     def read(cls, survey: Survey) -> Georef:

@@ -2,11 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from ..contract import VectorSource
+import cv2  # noqa: F401 - before pycolmap, whose PNG library otherwise crashes OpenCV's
+import numpy as np
+import pycolmap
+from numpy.typing import NDArray
+
+from ..block import Block
+from ..contract import VectorSource, encode
+from ..errors import InputError, NotEnoughData
+from ..files import digest, whole
+from ..frames import LocalFrame, projected_crs
+from ..georef import FOLDER, Georef
 from ..progress import SILENT, Progress
+from ..survey import Survey, held
+from ..vector import check_destination, polygons
+from . import georeport
+from .accuracy import Doming, alti, doming, plani
+from .control import Control, Given, control_from, given_from_layers
+from .gcpfiles import read_gcp_file
+from .gnss import Gnss, gnss_of
+from .heights import HeightPlan, plan_heights, undulation
+from .similarity import Similarity
+from .solution import Seen, Solution, find_marks, solve
+from .sparse import block_from_model, read_model
+
+Array = NDArray[np.float64]
+
+STEP = "georeference"
 
 
 @dataclass(frozen=True)
@@ -61,6 +87,234 @@ class Result:
     doming: float | None
 
 
+@dataclass(frozen=True)
+class Inputs:
+    """All that the user gave, read, checked and in the survey's CRS (WKT2)."""
+
+    crs: str
+    control: Control
+    gnss: Gnss
+    heights: HeightPlan
+    warnings: tuple[str, ...]
+
+
 def run(request: Request, progress: Progress = SILENT) -> Result:
-    """Georeference the survey."""
-    raise NotImplementedError
+    """Georeference the survey.
+
+    Raises
+    ------
+    InputError
+        When a parameter, layer, table or file cannot be used as given.
+    NotEnoughData
+        When control points and positions do not place the block.
+    """
+    _check_parameters(request)
+    survey = Survey.open(request.survey)
+    with held(survey.folder, STEP):
+        survey = Survey.open(request.survey)
+        oriented = survey.require("orient")
+        given = _given(request)
+        model = read_model(survey.folder / "model")
+        block = block_from_model(model)
+        progress.at(0.3)
+        inputs = _inputs(request, survey, given, block)
+        fingerprint = _fingerprint(request, inputs, oriented.fingerprint)
+        solution = _solve(block, inputs, request.sigma_mark)
+        progress.at(0.6)
+        result, dome = _result(request, solution, inputs, block)
+        georef = _georef(solution, inputs, result)
+        for text in inputs.warnings:
+            progress.warn(text)
+        standing = survey.record(STEP)
+        if standing is None or standing.fingerprint != fingerprint or survey.is_stale(STEP) or not _complete(survey):
+            # A kill from here to finish() leaves a survey that is not georeferenced, never one whose two files disagree.
+            survey.forget(STEP)
+            write_transformed(model, solution.fit.similarity, survey)
+            georef.write(survey)
+        progress.at(0.8)
+        georeport.write_layers(request.residuals, request.photos, solution, inputs, block)
+        report = georeport.report(solution, inputs, result, block, dome)
+        report.save(survey.report_path(STEP), request.output_html_file)
+        survey.finish(
+            STEP,
+            fingerprint,
+            built_on=("createsurvey", "orient"),
+            parameters=encode(request),
+            result=encode(result),
+        )
+        progress.info(georeport.verdict(solution, result))
+        progress.at(1.0)
+    return result
+
+
+def write_transformed(model: pycolmap.Reconstruction, similarity: Similarity, survey: Survey) -> None:
+    """Write ``model``, moved by the similarity, as the survey's georeferenced model; ids stay. ``model`` is moved in place."""
+    turn = pycolmap.Rotation3d(similarity.rotation)
+    model.transform(pycolmap.Sim3d(similarity.scale, turn, similarity.shift))
+    with whole(survey.folder / FOLDER) as part:
+        part.mkdir()
+        model.write(part)
+
+
+def _check_parameters(request: Request) -> None:
+    if request.method == "adjustment":
+        raise InputError("METHOD=adjustment is not available yet: use METHOD=similarity.")
+    if request.gcp_file and (request.gcps or request.marks):
+        raise InputError("GCP_FILE takes the place of GCPS and MARKS: give either the file or the two layers.")
+    if (request.gcps is None) != (request.marks is None):
+        raise InputError("GCPS and MARKS belong together: give both, or GCP_FILE, or neither.")
+    if request.check and not (request.gcps or request.gcp_file):
+        raise InputError("CHECK names check points but there are no GCPs: give GCPS and MARKS, or GCP_FILE.")
+    for name in ("sigma_h", "sigma_v", "sigma_mark"):
+        if not getattr(request, name) > 0:
+            raise InputError(f"{name.upper()} must be above 0.")
+    for path in (request.residuals, request.photos):
+        if path:
+            check_destination(path)
+
+
+def _given(request: Request) -> Given | None:
+    if request.gcp_file:
+        return read_gcp_file(request.gcp_file)
+    if request.gcps is None:
+        return None
+    return given_from_layers(
+        request.gcps,
+        request.marks,
+        name_field=request.name_field,
+        height_field=request.height_field,
+        role_field=request.role_field,
+        sigma_h_field=request.sigma_h_field,
+        sigma_v_field=request.sigma_v_field,
+    )
+
+
+def _inputs(request: Request, survey: Survey, given: Given | None, block: Block) -> Inputs:
+    crs = _crs(request, survey, given)
+    control = Control()
+    if given is not None:
+        control = control_from(
+            given, crs, survey.photographs, sigma_h=request.sigma_h, sigma_v=request.sigma_v, check=request.check
+        )
+    photographs = survey.photographs if request.use_gnss else ()
+    gnss = gnss_of(block.views, photographs, crs, request.lever_arm)
+    warnings = list(control.notes)
+    plan = plan_heights(
+        request.gcp_heights,
+        request.gnss_heights,
+        geoid=bool(request.geoid),
+        with_gcps=bool(control.points),
+        with_gnss=len(gnss) > 0,
+    )
+    if plan.sign and request.geoid:
+        raised = gnss.coordinates.copy()
+        raised[:, 2] += plan.sign * undulation(request.geoid, raised, crs)
+        gnss = Gnss(gnss.view, raised, gnss.sigmas, gnss.declared, gnss.lever)
+    elif request.geoid:
+        warnings.append("GEOID changes nothing here: no GNSS heights have to be brought to another kind.")
+    if not plan.comparable:
+        warnings.append(
+            "GNSS and GCP heights are of different kinds and there is no GEOID: GNSS heights are used for differences only, and "
+            "ALTI_GNSS is not determined."
+        )
+    if request.ignore is not None:
+        polygons(request.ignore, crs)
+        warnings.append("IGNORE has no effect on a similarity, which uses no tie points.")
+    return Inputs(crs, control, gnss, plan, tuple(warnings))
+
+
+def _crs(request: Request, survey: Survey, given: Given | None) -> str:
+    for text in (request.crs, survey.crs):
+        if text:
+            return projected_crs(text).to_wkt()
+    if given is not None and given.crs:
+        return projected_crs(given.crs).to_wkt()
+    raise InputError("The survey has no CRS, for its photographs have no positions, and there are no GCPs: give CRS and GCPS.")
+
+
+def _fingerprint(request: Request, inputs: Inputs, oriented: str) -> str:
+    points = [
+        (p.name, p.coordinates.tolist(), p.check, p.sigma_h, p.sigma_v, [(m.image, m.x, m.y) for m in p.marks])
+        for p in inputs.control.points
+    ]
+    positions = [a.tolist() for a in (inputs.gnss.view, inputs.gnss.coordinates, inputs.gnss.sigmas, inputs.gnss.lever)]
+    return digest(oriented, request.method, request.sigma_mark, inputs.crs, points, positions, inputs.heights)
+
+
+def _solve(block: Block, inputs: Inputs, sigma_mark: float) -> Solution:
+    seen = find_marks(block, inputs.control.points, sigma_mark)
+    _enough(seen, inputs)
+    places = [s.point.coordinates for s in seen if s.found is not None] or list(inputs.gnss.coordinates)
+    if not places:
+        raise NotEnoughData("There is neither a GCP nor a GNSS position with a height: give GCPS and MARKS, or GCP_FILE.")
+    comparable = inputs.heights.comparable
+    first = LocalFrame.at(inputs.crs, *map(float, np.mean(places, axis=0)))
+    rough = solve(block, seen, inputs.gnss, frame=first, comparable=comparable)
+    # The origin belongs in the middle of the block, wherever the control lies; to whole metres, so that it stays put.
+    middle = first.to_crs(np.median(rough.fit.similarity.apply(block.points), axis=0)[None])[0]
+    frame = LocalFrame.at(inputs.crs, *map(float, np.round(middle)))
+    return solve(block, seen, inputs.gnss, frame=frame, comparable=comparable)
+
+
+def _enough(seen: Sequence[Seen], inputs: Inputs) -> None:
+    control = [s for s in seen if not s.point.check]
+    if control and all(s.found is None for s in control):
+        raise NotEnoughData(
+            f"None of the {len(control)} control points of {inputs.control.where} has marks in two oriented photographs: "
+            "mark them in more photographs, or leave the GCPs out to use GNSS alone."
+        )
+
+
+def _result(request: Request, solution: Solution, inputs: Inputs, block: Block) -> tuple[Result, Doming | None]:
+    found = np.array([s.found is not None for s in solution.seen], bool)
+    check = np.array([s.point.check for s in solution.seen], bool)
+    control, checks = solution.errors[found & ~check], solution.errors[found & check]
+    loo = solution.loo[np.isfinite(solution.loo[:, 0])]
+    gnss_alti = alti(solution.gnss_errors) if inputs.heights.comparable else None
+    dome = _doming(solution, inputs, found & check, block)
+    result = Result(
+        request.survey,
+        len(control),
+        len(checks),
+        plani(control),
+        alti(control),
+        plani(checks),
+        alti(checks),
+        plani(loo),
+        alti(loo),
+        plani(solution.gnss_errors),
+        gnss_alti,
+        dome.amplitude if dome else None,
+    )
+    return result, dome
+
+
+def _doming(solution: Solution, inputs: Inputs, checks: NDArray[np.bool_], block: Block) -> Doming | None:
+    """Test for a dome on check and leave-one-out errors, or with too few of them on GNSS heights."""
+    limit = georeport.ground_pixel(block, solution.fit.similarity.scale)
+    left = np.isfinite(solution.loo[:, 0])
+    places = np.array([s.point.coordinates for s in solution.seen], float).reshape(-1, 3)[:, :2]
+    errors = np.where(left, solution.loo[:, 2], solution.errors[:, 2])
+    dome = doming(places[left | checks], errors[left | checks], limit)
+    if dome is None and len(inputs.gnss):
+        dome = doming(inputs.gnss.coordinates[:, :2], solution.gnss_errors[:, 2], limit)
+    return dome
+
+
+def _georef(solution: Solution, inputs: Inputs, result: Result) -> Georef:
+    similarity = solution.fit.similarity
+    numbers: dict[str, Any] = {k: v for k, v in encode(result).items() if k != "output"}
+    return Georef(
+        solution.frame,
+        "similarity",
+        (similarity.scale, *map(float, similarity.rotation.ravel()), *map(float, similarity.shift)),
+        tuple(map(float, solution.fit.pivot)),
+        tuple(map(float, solution.fit.covariance.ravel())),
+        numbers,
+        inputs.heights.kind,
+    )
+
+
+def _complete(survey: Survey) -> bool:
+    folder = survey.folder
+    return (folder / FOLDER).is_dir() and (folder / "georef.json").is_file() and survey.report_path(STEP).is_file()

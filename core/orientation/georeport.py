@@ -1,0 +1,336 @@
+"""What ``georeference`` shows: its report, its verdict and its layers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ..block import Block
+from ..report.html import Report, new_figure
+from ..vector import write_layer
+from .accuracy import Doming
+from .solution import Blunder, Seen, Solution
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .georeference import Inputs, Result
+
+Array = NDArray[np.float64]
+
+_EDGE_WARNING = 3.0  # times the sigma in the middle of the block
+_NARROW = np.radians(2.0)
+
+
+def verdict(solution: Solution, result: Result) -> str:
+    """Return one sentence for the analyst."""
+    counts = []
+    if result.control_count:
+        counts.append(f"{result.control_count} control points")
+    if "GNSS" in solution.based_on:
+        counts.append(f"the GNSS positions of {len(solution.gnss_errors)} photographs")
+    text = f"Georeferenced by a similarity on {' and '.join(counts)}"
+    if result.plani_check is not None:
+        text += f"; {result.check_count} check points differ by {_pair(result.plani_check, result.alti_check)}"
+    elif result.plani_loo is not None:
+        text += f"; left out one by one, the control points differ by {_pair(result.plani_loo, result.alti_loo)}"
+    elif result.plani_control is not None:
+        text += f"; the control points themselves differ by {_pair(result.plani_control, result.alti_control)}"
+    elif result.plani_gnss is not None:
+        text += f"; they differ by {_pair(result.plani_gnss, result.alti_gnss)}, and no independent point checks the result"
+    if solution.blunders:
+        text += f"; suspicious: {', '.join(dict.fromkeys(b.name for b in solution.blunders))}"
+    return text + "."
+
+
+def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | None) -> list[str]:
+    """Return what the analyst must know before using the result, a sentence each."""
+    told = list(inputs.warnings)
+    told += [_blunder_sentence(b, solution.seen) for b in solution.blunders]
+    told += [
+        f"The GNSS position of {b.name} is off by {b.error:.3g} m in {_where(b)}, {b.ratio:.1f} times its sigma: "
+        "it has little weight."
+        for b in solution.gnss_blunders
+    ]
+    for seen in solution.seen:
+        name = seen.point.name
+        if seen.found is None:
+            why = "its rays do not meet" if seen.marks >= 2 else f"it has {seen.marks} mark{'s' * (seen.marks != 1)}"
+            told.append(f"{name} is not used: {why} in oriented photographs; two marks are needed.")
+            continue
+        if seen.wrong:
+            told.append(f"The mark of {name} in {', '.join(seen.wrong)} contradicts its other marks and is left out: check it.")
+        elif not seen.found.agree:
+            worst = float(np.linalg.norm(seen.found.residuals, axis=1).max())
+            told.append(f"The marks of {name} do not agree with each other (up to {worst:.1f} px): check them.")
+        if seen.found.angle < _NARROW:
+            degrees = np.degrees(seen.found.angle)
+            told.append(f"The rays to {name} meet at {degrees:.1f} degrees only, which leaves its height uncertain.")
+    told += _factor_sentences(solution)
+    middle, edge = predicted(solution, block)
+    if max(edge[0] / middle[0], edge[1] / middle[1]) > _EDGE_WARNING:
+        told.append(
+            f"The georeferencing is weak away from its points: sigma at the edge of the block is {_pair(*edge)}, in its "
+            f"middle {_pair(*middle)}; put control near the edges."
+        )
+    if "GNSS" in solution.based_on and len(inputs.gnss) and not inputs.gnss.declared and solution.based_on == "GNSS":
+        told.append(
+            "The photographs' GNSS carries no sigma: the whole block may be shifted by metres (more in height), which no "
+            "residual shows; without control points do not compare it with another date before co-registration."
+        )
+    level = float(np.mean(solution.gnss_errors[:, 2])) if len(inputs.gnss) and solution.based_on != "GNSS" else 0.0
+    if abs(level) > 5.0 and inputs.heights.comparable:
+        told.append(
+            f"GNSS heights are {-level:+.1f} m off the block's on average: they may be heights of another kind (see "
+            "GCP_HEIGHTS, GNSS_HEIGHTS and GEOID)."
+        )
+    if dome is not None and dome.significant:
+        told.append(
+            f"Height errors form a dome of {dome.amplitude:+.3g} m (sigma {dome.sigma:.2g} m) from the middle to the outermost "
+            "point: the camera's distortion is not well determined."
+        )
+    return told
+
+
+def report(solution: Solution, inputs: Inputs, result: Result, block: Block, dome: Doming | None) -> Report:
+    """Return the report page."""
+    page = Report("Georeference", verdict(solution, result))
+    for text in findings(solution, inputs, block, dome):
+        page.warning(text)
+    middle, edge = predicted(solution, block)
+    page.heading("Accuracy")
+    page.table(
+        ["", "points", "plan (m)", "height (m)"],
+        [
+            ["control points, residuals", result.control_count, result.plani_control, result.alti_control],
+            ["check points", result.check_count, result.plani_check, result.alti_check],
+            ["control points, each left out", _count(solution.loo), result.plani_loo, result.alti_loo],
+            ["  as predicted for these", _count(solution.loo), *_rms_sigma(solution.loo_sigma)],
+            ["GNSS positions", len(solution.gnss_errors), result.plani_gnss, result.alti_gnss],
+            ["predicted sigma, middle of the block", None, *middle],
+            ["predicted sigma, edge of the block", None, *edge],
+        ],
+    )
+    page.text(
+        "Plan is the root mean square of the horizontal distance, height of the vertical. Predicted sigmas are of the "
+        "georeferencing alone, common to all that is measured in the block; they travel on to the surface model."
+    )
+    page.text(_basis(solution, inputs))
+    if dome is not None:
+        page.text(f"Doming: {dome.amplitude:+.3g} m from the middle to the outermost point, sigma {dome.sigma:.2g} m.")
+    if solution.seen or len(inputs.gnss):
+        page.heading("Residuals")
+        page.figure(_map(solution, inputs, block), "Arrows: from the given to the computed place, exaggerated; bars: height.")
+    if solution.seen:
+        page.table(
+            [
+                "name",
+                "role",
+                "marks",
+                "dE (m)",
+                "dN (m)",
+                "dU (m)",
+                "plan (m)",
+                "left out: plan (m)",
+                "left out: dU (m)",
+                "marks (px)",
+            ],
+            [_row(solution, i) for i in range(len(solution.seen))],
+        )
+    if len(inputs.gnss):
+        page.heading("GNSS")
+        names = [block.views[i].name for i in inputs.gnss.view]
+        page.table(
+            ["photograph", "dE (m)", "dN (m)", "dU (m)"],
+            [[n, *map(float, e)] for n, e in zip(names, solution.gnss_errors, strict=True)],
+        )
+    return page
+
+
+def write_layers(residuals: str | None, photos: str | None, solution: Solution, inputs: Inputs, block: Block) -> None:
+    """Write the residuals at the ground points' given places, and the projection centres, as GeoPackages in the CRS."""
+    if residuals:
+        write_layer(
+            residuals,
+            "residuals",
+            inputs.crs,
+            _residual_fields(solution),
+            _points([s.point.coordinates for s in solution.seen]),
+            "Point Z",
+        )
+    if photos:
+        similarity = solution.fit.similarity
+        centres = solution.frame.to_crs(similarity.apply(np.array([v.centre for v in block.views])))
+        errors = np.full((len(centres), 3), np.nan)
+        errors[inputs.gnss.view] = solution.gnss_errors
+        fields: dict[str, Any] = {"name": [v.name for v in block.views], "height": centres[:, 2], **_components(errors)}
+        write_layer(photos, "photos", inputs.crs, fields, _points(list(centres)), "Point Z")
+
+
+def predicted(solution: Solution, block: Block) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the georeferencing's predicted sigmas (plan, height; m) in the middle and at the worst corner of the block."""
+    ground = solution.fit.similarity.apply(block.points)
+    low, high = np.percentile(ground, [2, 98], axis=0)
+    middle = np.median(ground, axis=0)
+    corners = np.array([[x, y, middle[2]] for x in (low[0], high[0]) for y in (low[1], high[1])])
+    covariance = solution.fit.uncertainty(np.concatenate([middle[None], corners]))
+    plan = np.sqrt(covariance[:, 0, 0] + covariance[:, 1, 1])
+    height = np.sqrt(covariance[:, 2, 2])
+    return (float(plan[0]), float(height[0])), (float(plan[1:].max()), float(height[1:].max()))
+
+
+def ground_pixel(block: Block, scale: float) -> float:
+    """Return the median size of a pixel on the ground (m)."""
+    sizes = []
+    for index, view in enumerate(block.views):
+        points = block.points[block.observed_point[block.observed_view == index]]
+        if len(points):
+            depth = np.median(points @ view.rotation[2] + view.translation[2])
+            sizes.append(scale * float(depth) / view.camera.brown()[0])
+    return float(np.median(sizes))
+
+
+def _residual_fields(solution: Solution) -> dict[str, Any]:
+    seen = solution.seen
+    blunders = {b.name for b in solution.blunders}
+    marks_px = [None if s.found is None else _rms_pixels(s) for s in seen]
+    return {
+        "name": [s.point.name for s in seen],
+        "role": [_role(s) for s in seen],
+        "marks": [s.marks for s in seen],
+        **_components(solution.errors),
+        "plani": np.hypot(solution.errors[:, 0], solution.errors[:, 1]),
+        "sigma_h": [s.point.sigma_h for s in seen],
+        "sigma_v": [s.point.sigma_v for s in seen],
+        "loo_dE": solution.loo[:, 0],
+        "loo_dN": solution.loo[:, 1],
+        "loo_dU": solution.loo[:, 2],
+        "marks_px": marks_px,
+        "blunder": [s.point.name in blunders for s in seen],
+    }
+
+
+def _components(errors: Array) -> dict[str, Array]:
+    return {"dE": errors[:, 0], "dN": errors[:, 1], "dU": errors[:, 2]}
+
+
+def _points(coordinates: list[Array]) -> list[Any]:
+    return list(shapely.points(np.array(coordinates, float).reshape(-1, 3)))
+
+
+def _row(solution: Solution, index: int) -> list[Any]:
+    seen, error, left = solution.seen[index], solution.errors[index], solution.loo[index]
+    pixels = None if seen.found is None else _rms_pixels(seen)
+    plan = float(np.hypot(error[0], error[1]))
+    return [
+        seen.point.name,
+        _role(seen),
+        seen.marks,
+        *map(float, error),
+        plan,
+        float(np.hypot(*left[:2])),
+        float(left[2]),
+        pixels,
+    ]
+
+
+def _rms_pixels(seen: Seen) -> float | None:
+    if seen.found is None:
+        return None
+    return float(np.sqrt(np.mean(np.sum(seen.found.residuals[seen.found.used] ** 2, axis=1))))
+
+
+def _role(seen: Seen) -> str:
+    role = "check" if seen.point.check else "control"
+    return role if seen.found is not None else f"{role}, not used"
+
+
+def _map(solution: Solution, inputs: Inputs, block: Block) -> Figure:
+    figure = new_figure(9.0, 7.0)
+    axes = figure.add_subplot()
+    ground = solution.frame.to_crs(solution.fit.similarity.apply(block.points[:: max(1, len(block.points) // 4000)]))
+    origin = ground.mean(axis=0)
+    axes.plot(*(ground - origin)[:, :2].T, ",", color="#c9a45c", label="tie points")
+    places = np.array([s.point.coordinates for s in solution.seen], float).reshape(-1, 3) - origin
+    groups = [
+        ("control", "#1f5fa8", "^", places, solution.errors, np.array([not s.point.check for s in solution.seen], bool)),
+        ("check", "#c2452d", "o", places, solution.errors, np.array([s.point.check for s in solution.seen], bool)),
+        ("GNSS", "#5a7d4f", ".", inputs.gnss.coordinates - origin, solution.gnss_errors, np.ones(len(inputs.gnss), bool)),
+    ]
+    shown = np.concatenate([e[m] for *_, e, m in groups])
+    shown = shown[np.isfinite(shown[:, 0])]
+    extent = float(np.ptp(ground[:, :2], axis=0).max())
+    longest = float(np.percentile(np.hypot(shown[:, 0], shown[:, 1]), 90)) if len(shown) else 0.0
+    grow = _round_down(0.08 * extent / longest) if longest > 0 else 1.0
+    for label, colour, symbol, at, errors, members in groups:
+        if not members.any():
+            continue
+        axes.plot(at[members, 0], at[members, 1], symbol, color=colour, label=label, markersize=6)
+        arrows = members & np.isfinite(errors[:, 0])
+        options: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "color": colour, "width": 0.003}
+        axes.quiver(at[arrows, 0], at[arrows, 1], grow * errors[arrows, 0], grow * errors[arrows, 1], **options)
+        axes.vlines(at[arrows, 0], at[arrows, 1], at[arrows, 1] + grow * errors[arrows, 2], color=colour, alpha=0.4, linewidth=4)
+    for seen, place in zip(solution.seen, places, strict=True):
+        axes.annotate(seen.point.name, place[:2], xytext=(5, 5), textcoords="offset points", fontsize=8)
+    axes.set(xlabel=f"easting - {origin[0]:.0f} m", ylabel=f"northing - {origin[1]:.0f} m", aspect="equal")
+    axes.set_title(f"Errors enlarged {grow:g} times", fontsize=10)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    return figure
+
+
+def _round_down(value: float) -> float:
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(d for d in (1, 2, 5) if d * power <= value * (1 + 1e-9)))
+
+
+def _basis(solution: Solution, inputs: Inputs) -> str:
+    based = {
+        "control": "The similarity rests on the control points alone; GNSS positions are compared with it and do not enter it.",
+        "control and GNSS": "The control points do not suffice: GNSS positions give shape and tilt, GCPs the level.",
+        "GNSS": "There are no control points: the similarity rests on the GNSS positions of the projection centres.",
+    }[solution.based_on]
+    return f"{based} Heights are {inputs.heights.kind}. Scale {solution.fit.similarity.scale:.6g} m per unit of the free frame."
+
+
+def _factor_sentences(solution: Solution) -> list[str]:
+    factor = solution.fit.estimated_factor
+    if solution.based_on == "GNSS" or factor is None or factor < 9.0:
+        return []
+    return [
+        f"The control points fit {np.sqrt(factor):.0f} times worse than their sigmas say: these are too small, or the block is "
+        "bent; the predicted sigmas follow the fit, not the sigmas given."
+    ]
+
+
+def _blunder_sentence(blunder: Blunder, seen: tuple[Seen, ...]) -> str:
+    check = any(s.point.name == blunder.name and s.point.check for s in seen)
+    text = f"{blunder.name} is off by {blunder.error:.3g} m in {_where(blunder)}, {blunder.ratio:.1f} times its predicted sigma: "
+    return text + (
+        "check its coordinates and marks." if check else "it is kept with next to no weight; check its coordinates and marks."
+    )
+
+
+def _where(blunder: Blunder) -> str:
+    return "plan" if blunder.part == "plan" else "height"
+
+
+def _rms_sigma(sigmas: Array) -> tuple[float | None, float | None]:
+    good = sigmas[np.isfinite(sigmas[:, 0])]
+    if not len(good):
+        return None, None
+    return float(np.sqrt(np.mean(np.sum(good[:, :2] ** 2, axis=1)))), float(np.sqrt(np.mean(good[:, 2] ** 2)))
+
+
+def _count(errors: Array) -> int:
+    return int(np.isfinite(errors[:, 0]).sum())
+
+
+def _pair(plan: float | None, height: float | None) -> str:
+    return f"{_metres(plan)} in plan" + ("" if height is None else f" and {_metres(height)} in height")
+
+
+def _metres(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f} m" if abs(value) < 1 else f"{value:.2f} m"
