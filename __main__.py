@@ -1,9 +1,17 @@
 """Start the engine, as ``python -m strandline`` or by the path of this file in a folder of any name."""
 
 import importlib.util
+import json
 import os
 import sys
 from pathlib import Path
+
+if sys.version_info < (3, 11):  # noqa: UP036 - whatever the project says, this may be any Python
+    # Said as the door expects it, before anything is imported that this Python cannot read.
+    _told = "The engine needs Python 3.11 or newer, and {} is {}.{}: run 'Check engine' with INSTALL, or name another Python."
+    _text = _told.format(sys.executable, *sys.version_info[:2])
+    print(json.dumps({"type": "error", "kind": "MissingDependency", "text": _text}))
+    sys.exit(1)
 
 # Work is spread over processes, so each one keeps to a single thread; set before numpy is imported.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):

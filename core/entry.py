@@ -80,16 +80,26 @@ def main(arguments: list[str] | None = None) -> int:
     except Cancelled:
         lines.send(type="error", kind="Cancelled", text="Cancelled.")
         return 1
+    except ModuleNotFoundError as error:
+        # One of our own modules that is missing is a bug; one of a library's is an engine that is not whole.
+        if (error.name or "").startswith("strandline"):
+            return _bug(lines, error)
+        told = f"The engine lacks the package {error.name}: run 'Check engine' with INSTALL, or `make setup` in a clone."
+        lines.send(type="error", kind="MissingDependency", text=told, traceback=traceback.format_exc())
+        return 1
     except OSError as error:
         # A full disk, a read-only folder or a vanished drive is the user's to mend, and says which file.
         lines.send(type="error", kind="InputError", text=f"{error}.", traceback=traceback.format_exc())
         return 1
     except Exception as error:
-        text = f"{type(error).__name__}: {error}"
-        lines.send(type="error", kind="Bug", text=text, traceback=traceback.format_exc())
-        return 2
+        return _bug(lines, error)
     lines.send(type="result", result=result)
     return 0
+
+
+def _bug(lines: JsonLines, error: Exception) -> int:
+    lines.send(type="error", kind="Bug", text=f"{type(error).__name__}: {error}", traceback=traceback.format_exc())
+    return 2
 
 
 def _read(path: Path) -> Any:
@@ -108,11 +118,26 @@ def _claim_stdout() -> Any:
 
 
 def _end_with_stdin() -> None:
+    """End this process, and its group when it leads one, as soon as standard input closes."""
+    leads = hasattr(os, "killpg") and os.getpgid(0) == os.getpid()
+    if leads:
+        _ask_kernel_to_kill()
+
     def watch() -> None:
         while os.read(0, 4096):
             pass
-        if hasattr(os, "killpg") and os.getpgid(0) == os.getpid():
+        if leads:
             os.killpg(0, signal.SIGKILL)
         os._exit(1)  # workers watch their parent, so they end too
 
     threading.Thread(target=watch, name="door", daemon=True).start()
+
+
+def _ask_kernel_to_kill() -> None:
+    """Have Linux itself end the group: native code may hold the interpreter, and with it the watching thread, for long."""
+    import fcntl
+
+    if sys.platform == "linux":
+        fcntl.fcntl(0, fcntl.F_SETOWN, -os.getpid())
+        fcntl.fcntl(0, fcntl.F_SETSIG, signal.SIGKILL)
+        fcntl.fcntl(0, fcntl.F_SETFL, fcntl.fcntl(0, fcntl.F_GETFL) | os.O_ASYNC)
