@@ -1,0 +1,41 @@
+# What one does in a clone. `make` alone tells.
+
+ENGINE := .engine/bin
+QGIS_PYTHON := /usr/bin/python3
+# QGIS without a window, with a profile of its own and the plugin under its right name.
+QGIS_ENV := QT_QPA_PLATFORM=offscreen QGIS_CUSTOM_CONFIG_PATH=$(CURDIR)/.build/profile QGIS_PLUGINPATH=$(CURDIR)/.build/plugins
+QGIS_SIDE := __init__.py algorithms bridge provider i18n
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint bench strings models package
+
+help: ## show this
+	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1|\2/' | column -t -s '|'
+
+setup: ## install QGIS (Debian) and the engine where they are missing
+	@scripts/setup
+
+demo: setup ## from simulated photographs to volumes, through QGIS; the results are in demo/
+	$(QGIS_ENV) $(ENGINE)/python scripts/demo.py
+
+test: setup ## all tests: the engine's, then those that go through QGIS
+	$(ENGINE)/python -m pytest tests/core
+	$(QGIS_ENV) $(QGIS_PYTHON) -m pytest tests/qgis
+
+lint: setup ## style, types and spelling
+	$(ENGINE)/ruff check .
+	$(ENGINE)/ruff format --check .
+	cd .build/plugins && $(CURDIR)/$(ENGINE)/mypy --config-file $(CURDIR)/pyproject.toml -p strandline.core
+	$(ENGINE)/codespell
+
+bench: setup ## benchmarks; their numbers go to the terminal
+	$(ENGINE)/python -m pytest tests/benchmarks -s
+
+strings: ## collect the words to translate into i18n/*.ts
+	$(QGIS_PYTHON) scripts/strings.py
+
+models: setup ## make models/*.model3 again from scripts/build_models.py
+	$(QGIS_ENV) $(QGIS_PYTHON) scripts/build_models.py
+
+package: ## the plugin as a zip in dist/, to install from QGIS's plugin manager
+	$(QGIS_PYTHON) scripts/package.py
