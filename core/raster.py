@@ -6,8 +6,9 @@ Arrays are float32 or uint8 with rows from north to south; NaN is "no value" and
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import rasterio.shutil
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 from rasterio.enums import Resampling
+from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.transform import Affine
 from rasterio.windows import Window
 
@@ -29,7 +31,10 @@ _BLOCK = 512
 
 @dataclass(frozen=True)
 class Grid:
-    """A north-up grid with square cells: the west and north edges (m), the cell size (m), its size, its CRS (WKT2)."""
+    """A north-up grid: the west and north edges (m), the cell size (m), its size in cells, its CRS (WKT2).
+
+    Cells are square unless ``cell_north``, their size from south to north, says otherwise.
+    """
 
     west: float
     north: float
@@ -37,21 +42,99 @@ class Grid:
     width: int
     height: int
     crs: str
+    cell_north: float | None = None
+
+    @property
+    def step_north(self) -> float:
+        """The cell's size from south to north (m)."""
+        return self.cell if self.cell_north is None else self.cell_north
+
+    @property
+    def cell_area(self) -> float:
+        """The area of a cell (m2)."""
+        return self.cell * self.step_north
 
     @property
     def transform(self) -> Affine:
         """The affine from column, row (corners) to easting, northing."""
-        return Affine(self.cell, 0.0, self.west, 0.0, -self.cell, self.north)
+        return Affine(self.cell, 0.0, self.west, 0.0, -self.step_north, self.north)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """West, south, east, north."""
-        return self.west, self.north - self.height * self.cell, self.west + self.width * self.cell, self.north
+        return self.west, self.north - self.height * self.step_north, self.west + self.width * self.cell, self.north
+
+    def centres(self, rows: NDArray[Any], columns: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the eastings and northings of the centres of cells, in the shapes of ``columns`` and ``rows``."""
+        east = self.west + (np.asarray(columns, np.float64) + 0.5) * self.cell
+        north = self.north - (np.asarray(rows, np.float64) + 0.5) * self.step_north
+        return np.asarray(east), np.asarray(north)
 
     def window(self, column: int, row: int, width: int, height: int) -> Grid:
         """Return the part of the grid that starts at ``column``, ``row``."""
-        west, north = self.west + column * self.cell, self.north - row * self.cell
-        return Grid(west, north, self.cell, width, height, self.crs)
+        west, north = self.west + column * self.cell, self.north - row * self.step_north
+        return replace(self, west=west, north=north, width=width, height=height)
+
+
+class RasterFile:
+    """The first band of a raster file, read by windows. Use as a context manager.
+
+    ``transform`` holds a, b, c, d, e, f of ``x = a column + b row + c``, ``y = d column + e row + f``; ``crs`` is WKT2 or None,
+    ``nodata`` the declared value or None, ``unit`` the band's declared unit or "", ``colour`` True for a picture.
+    A height is ``value * scale + offset``.
+    """
+
+    def __init__(self, path: str) -> None:
+        try:
+            with warnings.catch_warnings():
+                # A raster without a place is refused by who needs one, in a sentence of its own.
+                warnings.simplefilter("ignore", NotGeoreferencedWarning)
+                self._file = rasterio.open(path)
+        except RasterioError as error:
+            raise InputError(f"The raster {path} cannot be read ({error}): give a raster file that is whole.") from error
+        file = self._file
+        self.path, self.width, self.height = path, int(file.width), int(file.height)
+        self.transform: tuple[float, ...] = tuple(file.transform)[:6]
+        self.placed = not file.transform.is_identity
+        self.crs: str | None = file.crs.to_wkt(version="WKT2_2019") if file.crs else None
+        self.nodata: float | None = file.nodata
+        self.scale, self.offset = float(file.scales[0]), float(file.offsets[0])
+        self.unit = str(file.units[0] or "")
+        self.dtype = str(file.dtypes[0])
+        interpretations = [c.name for c in file.colorinterp]
+        self.colour = "red" in interpretations or "palette" in interpretations
+        self.bands = sum(name != "alpha" for name in interpretations)
+        self.tags: dict[str, str] = file.tags()
+        self._masked = any(flag.name in ("per_dataset", "alpha") for flag in file.mask_flag_enums[0])
+
+    def __enter__(self) -> RasterFile:
+        """Return itself, open."""
+        return self
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def read(self, column: int, row: int, width: int, height: int) -> NDArray[np.float64]:
+        """Return the stored values of a window (rows, columns) inside the raster; NaN where a mask or alpha band hides them.
+
+        Neither nodata nor scale and offset are applied: whoever reads knows more about them than the file.
+
+        Raises
+        ------
+        InputError
+            When the file is damaged there.
+        """
+        window = Window(column, row, width, height)
+        try:
+            values = self._file.read(1, window=window).astype(np.float64)
+            if self._masked:
+                values[self._file.dataset_mask(window=window) == 0] = np.nan
+        except RasterioError as error:
+            raise InputError(
+                f"The raster {self.path} is damaged near row {row} ({error.__cause__ or error}): give a whole copy of it."
+            ) from error
+        return values
 
 
 @dataclass(frozen=True)
@@ -191,4 +274,4 @@ def _fill(file: Any) -> None:
         file.write(np.full(shape, NODATA, np.float32), window=window)
 
 
-__all__ = ["NODATA", "CogWriter", "Grid", "Patch", "Resampling", "check_destination", "write_cog"]
+__all__ = ["NODATA", "CogWriter", "Grid", "Patch", "RasterFile", "Resampling", "check_destination", "write_cog"]

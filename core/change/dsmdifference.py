@@ -2,11 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
+import numpy as np
+import shapely
+
 from ..contract import RasterSource, VectorSource
+from ..errors import InputError
 from ..progress import SILENT, Progress
+from ..raster import check_destination
+from .alignment import Aligned, common_grid
+from .coregistration import Method, Shift, fit_shift, statistics
+from .difference import Pair, Sigma, Stable, difference, stable_ground
+from .errormodel import error_model, systematic_error
+from .heights import Heights, open_heights
+from .report import Findings, write_report
+from .units import true_area
+from .volumes import Volume
+from .volumetable import write_volumes
+from .zones import Zone, read_zones, union
 
 
 @dataclass(frozen=True)
@@ -59,4 +76,237 @@ class Result:
 
 def run(request: Request, progress: Progress = SILENT) -> Result:
     """Compute the difference and the volumes."""
-    raise NotImplementedError
+    _validate(request)
+    heard = _Heard(progress)
+    progress = Progress(heard)
+    with ExitStack() as files:
+        heights = [
+            files.enter_context(open_heights(source, label, request.nodata, progress.part(start, start + 0.1)))
+            for source, label, start in ((request.before, "BEFORE", 0.0), (request.after, "AFTER", 0.1))
+        ]
+        before, after = heights
+        grid, shared = common_grid(before, after)
+        _, areas = true_area(grid.crs, *shapely.get_coordinates(shapely.point_on_surface(shared))[0])
+        if areas:
+            progress.warn(areas)
+        zones = read_zones(request.zones, "ZONES", request.zone_field, grid.crs) if request.zones else [Zone("overlap", shared)]
+        if not any(shapely.intersects(zone.shape, shared) for zone in zones):
+            raise InputError("No zone of ZONES lies where BEFORE and AFTER overlap: draw zones there, and check the layer's CRS.")
+        stable = _shapes(request.stable, "STABLE", grid.crs)
+        if stable and not any(shapely.intersects(s, shared) for s in stable):
+            raise InputError("STABLE does not lie where BEFORE and AFTER overlap: draw it there, and check the layer's CRS.")
+        pair = Pair(Aligned(before, grid), Aligned(after, grid), _shapes(request.ignore, "IGNORE", grid.crs))
+        if _same_file(request.before.path, request.after.path):
+            progress.warn("BEFORE and AFTER are the same file: there is no change to see.")
+
+        precisions = [
+            open_heights(source, label, None, progress.part(0.2, 0.25)) if source else None
+            for source, label in ((request.before_precision, "BEFORE_PRECISION"), (request.after_precision, "AFTER_PRECISION"))
+        ]
+        for precision in precisions:
+            if precision:
+                files.enter_context(precision)
+        sigma = _given_sigma(request, pair, precisions)
+        ground = stable_ground(pair, stable, sigma, progress.part(0.25, 0.4)) if stable else None
+        shift = _shift(request, ground)
+        if ground is not None and len(ground.change):
+            ground_after = ground.change - shift.at(ground.x, ground.y)
+            stats = statistics(ground.change), statistics(ground_after)
+            if sigma is None:
+                sigma = Sigma(common=stats[1].nmad)
+        else:
+            stats = None
+            if stable:
+                progress.warn("STABLE covers no cell with a height in both rasters: it tells nothing.")
+        if sigma is None and request.significant:
+            raise InputError(
+                "SIGNIFICANT needs a level of detection: give BEFORE_SIGMA and AFTER_SIGMA, the two PRECISION rasters, or STABLE."
+            )
+        if sigma is None:
+            progress.warn(
+                "The sigma of the heights is not known, so no change can be called significant: "
+                "give BEFORE_SIGMA and AFTER_SIGMA, the two PRECISION rasters, or STABLE."
+            )
+        if ground is not None and ground.sigma is None and sigma is not None:
+            ground = replace(ground, sigma=np.full(len(ground.change), sigma.common))
+        steps = (grid.step_north, grid.cell)
+        model, variogram = error_model(request.correlation_range, ground, shift, sigma is not None, steps, progress)
+        systematic = systematic_error(request.registration_sigma, shift, ground, variogram, before, after, grid.crs)
+
+        shapes = [zone.shape for zone in zones]
+        whole = union(zones) if len(zones) > 1 else shapes[0]
+        outcome = difference(
+            pair,
+            shift,
+            sigma,
+            [*shapes, whole] if len(zones) > 1 else shapes,
+            registration=(request.registration_sigma or 0.0) if shift.method == "none" else 0.0,
+            method=request.lod,
+            confidence=request.confidence,
+            output=request.output,
+            significant=request.significant,
+            tags=_tags(request, shift),
+            progress=progress.part(0.4, 0.95),
+        )
+    if outcome.moved == 0:
+        progress.warn("BEFORE and AFTER are identical: no cell differs.")
+    if outcome.without_sigma:
+        progress.warn(f"{outcome.without_sigma} cells have a change but no precision: they are never significant.")
+    volumes = [tally.volume(model, systematic) for tally in outcome.tallies]
+    total = volumes[-1]
+    empty = [zone.name for zone, volume in zip(zones, volumes, strict=False) if volume.net is None]
+    if empty:
+        progress.warn(f"No cell of {', '.join(empty)} has a height in both rasters: their volumes are not known.")
+    if request.volumes:
+        write_volumes(request.volumes, zones, volumes[: len(zones)], grid.crs, request.confidence)
+    if request.output_html_file:
+        write_report(
+            request.output_html_file,
+            Findings(
+                before=before,
+                after=after,
+                grid=grid,
+                outcome=outcome,
+                zones=zones,
+                volumes=volumes[: len(zones)],
+                total=total,
+                confidence=request.confidence,
+                method=request.lod,
+                shift=shift,
+                stable=stats,
+                model=model,
+                variogram=variogram,
+                sigma=_sigma_words(request, sigma),
+                warnings=tuple(heard.warnings),
+            ),
+        )
+    progress.at(1.0)
+    return _result(request, total)
+
+
+class _Heard:
+    """A listener that passes everything on and remembers the warnings, for the report."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress, self.warnings = progress, list[str]()
+
+    def fraction(self, value: float) -> None:
+        self._progress.at(value)
+
+    def message(self, text: str, *, warning: bool) -> None:
+        if warning:
+            self.warnings.append(text)
+            self._progress.warn(text)
+        else:
+            self._progress.info(text)
+
+    def cancelled(self) -> bool:
+        return False  # the outer progress raises
+
+
+def _validate(request: Request) -> None:
+    """Refuse, before any work, what cannot be meant."""
+    if not 0.0 < request.confidence < 1.0:
+        raise InputError(f"CONFIDENCE is {request.confidence:g}: give a number between 0 and 1, such as 0.95.")
+    for name in ("before_sigma", "after_sigma", "registration_sigma", "correlation_range"):
+        value = getattr(request, name)
+        if value is not None and value < 0:
+            raise InputError(f"{name.upper()} is {value:g}: give metres that are not negative.")
+    for side in ("before", "after"):
+        if getattr(request, f"{side}_sigma") is not None and getattr(request, f"{side}_precision") is not None:
+            raise InputError(f"{side.upper()}_SIGMA and {side.upper()}_PRECISION are both given: give one of them.")
+    if request.coregister == "horizontal":
+        raise InputError(
+            "COREGISTER=horizontal is not offered: a beach hardly tells a horizontal shift; choose vertical, plane or none."
+        )
+    if request.coregister in ("vertical", "plane") and request.stable is None:
+        raise InputError(f"COREGISTER={request.coregister} needs STABLE: draw polygons on ground that has not moved.")
+    sources = (request.before, request.after, request.before_precision, request.after_precision)
+    inputs = {Path(s.path).resolve() for s in sources if s}
+    outputs = [p for p in (request.output, request.significant, request.volumes, request.output_html_file) if p]
+    if len({Path(p).resolve() for p in outputs}) < len(outputs):
+        raise InputError("Two outputs have the same name: give each its own.")
+    for path in outputs:
+        if Path(path).resolve() in inputs:
+            raise InputError(f"The output {path} is also an input: choose another name.")
+    for raster in (request.output, request.significant):
+        if raster:
+            check_destination(raster)
+    if request.volumes and Path(request.volumes).suffix.lower() != ".gpkg":
+        raise InputError(f"The layer {request.volumes} must be a GeoPackage: give a name that ends in .gpkg.")
+
+
+def _same_file(first: str, second: str) -> bool:
+    return Path(first).resolve() == Path(second).resolve()
+
+
+def _shapes(source: VectorSource | None, label: str, crs: str) -> list[shapely.Geometry]:
+    return [zone.shape for zone in read_zones(source, label, None, crs)] if source else []
+
+
+def _given_sigma(request: Request, pair: Pair, precisions: list[Heights | None]) -> Sigma | None:
+    """Return the sigma that the user gave for both models, None unless it is complete."""
+    numbers = (request.before_sigma, request.after_sigma)
+    before, after = (Aligned(p, pair.grid) if p else number for p, number in zip(precisions, numbers, strict=True))
+    if before is None or after is None:
+        return None
+    if request.lod == "uniform":
+        squares = [p.mean_square if p else float(n or 0.0) ** 2 for p, n in zip(precisions, numbers, strict=True)]
+        return Sigma(common=float(np.sqrt(sum(squares))))
+    return Sigma(before, after)
+
+
+def _shift(request: Request, ground: Stable | None) -> Shift:
+    method: Method
+    if request.coregister == "auto":
+        method = "vertical" if ground is not None else "none"
+    else:
+        method = "none" if request.coregister == "horizontal" else request.coregister
+    if ground is None:
+        return Shift("none")
+    return fit_shift(method, ground.x, ground.y, ground.change)
+
+
+def _sigma_words(request: Request, sigma: Sigma | None) -> str:
+    if sigma is None:
+        return "not known"
+    given = [
+        "precision raster" if precision else f"{number:g} m" if number is not None else None
+        for precision, number in (
+            (request.before_precision, request.before_sigma),
+            (request.after_precision, request.after_sigma),
+        )
+    ]
+    if None not in given:
+        return f"BEFORE: {given[0]}; AFTER: {given[1]}"
+    return f"{sigma.common:.4f} m for the difference, the NMAD of stable ground"
+
+
+def _tags(request: Request, shift: Shift) -> dict[str, str]:
+    return {
+        "STRANDLINE_BEFORE": Path(request.before.path).name,
+        "STRANDLINE_AFTER": Path(request.after.path).name,
+        "STRANDLINE_DIFFERENCE": "after minus before, metres",
+        "STRANDLINE_COREGISTRATION": f"{shift.method}: {shift.describe()}",
+    }
+
+
+def _result(request: Request, total: Volume) -> Result:
+    return Result(
+        output=request.output,
+        net=total.net,
+        net_sigma=total.sigma.total,
+        net_random=total.sigma.random,
+        net_correlated=total.sigma.correlated,
+        net_systematic=total.sigma.systematic,
+        erosion=total.erosion,
+        erosion_sigma=total.erosion_sigma.total,
+        deposition=total.deposition,
+        deposition_sigma=total.deposition_sigma.total,
+        erosion_significant=total.erosion_significant,
+        deposition_significant=total.deposition_significant,
+        net_significant=total.net_significant,
+        area=total.area,
+        covered_percent=total.covered_percent,
+        significant=request.significant,
+    )

@@ -1,0 +1,213 @@
+"""The difference of two aligned models, tile by tile: change, sigma, significance, raster files and tallies."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ..errors import NotEnoughData
+from ..progress import Progress
+from ..raster import CogWriter, Grid, Patch
+from .alignment import Aligned, tiles
+from .coregistration import Shift
+from .sampling import Sample
+from .significance import HALO, beyond_detection, coherent
+from .volumes import Cells, Tally
+from .zones import cell_shares, touched
+
+Array = NDArray[np.float64]
+_PREVIEW = 900  # cells of the report's map along its longer side
+_STABLE_CELLS = 400_000  # of stable ground that are kept; more would tell nothing new
+
+
+@dataclass(frozen=True)
+class Sigma:
+    """Where the sigma of a cell's change comes from: two precision rasters or numbers, or one number for both.
+
+    ``common`` (m) stands for both models; else ``before`` and ``after`` do.
+    """
+
+    before: Aligned | float | None = None
+    after: Aligned | float | None = None
+    common: float | None = None
+
+    def at(self, window: Grid) -> Array:
+        """Return the sigma (rows, columns) on a window; NaN where a precision raster has none."""
+        if self.common is not None:
+            return np.full((window.height, window.width), self.common)
+        return np.asarray(np.hypot(_one(self.before, window), _one(self.after, window)))
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two models on one grid; ``ignore`` are polygons in the grid's CRS whose cells have no change."""
+
+    before: Aligned
+    after: Aligned
+    ignore: list[Any]
+
+    @property
+    def grid(self) -> Grid:
+        """The common grid."""
+        return self.before.grid
+
+    def tiles(self, halo: int = 0) -> list[tuple[int, int, int, int]]:
+        """Return the grid's tiles, sized by what must be read for one."""
+        return tiles(self.grid, max(self.before.points, self.after.points), halo)
+
+    def change(self, window: Grid) -> tuple[Array, Array]:
+        """Return after minus before and before (rows, columns) on a window."""
+        before = self.before.read(window)
+        change = self.after.read(window) - before
+        if self.ignore:
+            change[touched(self.ignore, window)] = np.nan
+        return change, before
+
+
+@dataclass
+class Stable:
+    """Cells of stable ground: number of row and column, place (m), change and sigma (n,)."""
+
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    x: Array
+    y: Array
+    change: Array
+    sigma: Array | None
+    count: int
+
+
+@dataclass
+class Outcome:
+    """What a pass over the grid leaves: tallies, a thinned map of change and BEFORE's height, and counts."""
+
+    tallies: list[Tally]
+    change: Array
+    height: Array
+    thinning: int
+    valid: int = 0
+    moved: int = 0
+    without_sigma: int = 0
+
+
+def stable_ground(pair: Pair, stable: list[Any], sigma: Sigma | None, progress: Progress) -> Stable:
+    """Return the change of the cells of which at least half lies on stable ground."""
+    grid = pair.grid
+    sample = Sample(_STABLE_CELLS, 6)
+    tree = shapely.STRtree(stable)
+    for column, row, width, height in progress.over(pair.tiles()):
+        window = grid.window(column, row, width, height)
+        near = tree.query(shapely.box(*window.bounds))
+        if not len(near):
+            continue
+        inside = touched([stable[i] for i in near], window, 0.5)
+        if not inside.any():
+            continue
+        change, _ = pair.change(window)
+        spread = np.zeros_like(change) if sigma is None else sigma.at(window)
+        rows, columns = np.nonzero(inside & np.isfinite(change) & np.isfinite(spread))
+        r, c = rows + row, columns + column
+        x, y = grid.centres(r, c)
+        sample.add(r * grid.width + c, r.astype(float), c.astype(float), x, y, change[rows, columns], spread[rows, columns])
+    r, c, x, y, change, spread = sample.values.T
+    known = None if sigma is None else spread
+    return Stable(r.astype(np.int64), c.astype(np.int64), x, y, change, known, sample.count)
+
+
+def difference(
+    pair: Pair,
+    shift: Shift,
+    sigma: Sigma | None,
+    shapes: list[Any],
+    *,
+    registration: float,
+    method: Literal["cell", "uniform", "coherent"],
+    confidence: float,
+    output: str,
+    significant: str | None,
+    tags: dict[str, str],
+    progress: Progress,
+) -> Outcome:
+    """Write the change, and where asked the significant change, and tally it over ``shapes``.
+
+    ``registration`` (m) widens the level of detection only. Nothing is left on disk when this fails.
+    """
+    grid = pair.grid
+    thinning = max(1, -(-max(grid.width, grid.height) // _PREVIEW))
+    small = (-(-grid.height // thinning), -(-grid.width // thinning))
+    outcome = Outcome([Tally(float(shapely.area(s))) for s in shapes], np.full(small, np.nan), np.full(small, np.nan), thinning)
+    tree = shapely.STRtree(shapes)
+    halo = HALO if method == "coherent" and sigma is not None else 0
+    with ExitStack() as files:
+        whole = files.enter_context(CogWriter(output, grid, names=("change",), tags=tags))
+        kept_file = (
+            files.enter_context(CogWriter(significant, grid, names=("significant change",), tags=tags)) if significant else None
+        )
+        for column, row, width, height in progress.over(pair.tiles(halo)):
+            around, inner = _with_halo(grid, column, row, width, height, halo)
+            change, before = pair.change(around)
+            change = change - _shift_on(shift, around)
+            spread = kept = None
+            if sigma is not None:
+                spread = sigma.at(around)
+                detection = np.hypot(spread, registration)
+                rule = coherent if method == "coherent" else beyond_detection
+                kept = rule(change, detection, confidence)[inner] & np.isfinite(change[inner])
+                spread = spread[inner]
+                outcome.without_sigma += int(np.count_nonzero(np.isfinite(change[inner]) & ~np.isfinite(spread)))
+            change, before = change[inner], before[inner]
+            whole.write(Patch(column, row, change[None]))
+            if kept_file is not None and kept is not None:
+                kept_file.write(Patch(column, row, np.where(kept, change, np.nan)[None]))
+            window = grid.window(column, row, width, height)
+            tile = Cells(window, row * grid.width + column, grid.width, change, spread, kept, before)
+            for i in tree.query(shapely.box(*window.bounds)):
+                found = cell_shares(shapes[i], window)
+                if found is not None:
+                    outcome.tallies[i].add(tile, *found)
+            _count(outcome, column, row, change, before)
+        if outcome.valid == 0:
+            raise NotEnoughData("BEFORE and AFTER have no cell where both have a height: choose rasters whose data overlap.")
+    return outcome
+
+
+def _one(source: Aligned | float | None, window: Grid) -> Array:
+    if isinstance(source, Aligned):
+        values = source.read(window)
+        values[values <= 0] = np.nan
+        return values
+    return np.full((window.height, window.width), np.nan if source is None else source)
+
+
+def _with_halo(grid: Grid, column: int, row: int, width: int, height: int, halo: int) -> tuple[Grid, tuple[slice, slice]]:
+    """Return the window with its halo, cut at the grid's edges, and where the window lies in it."""
+    left, top = min(halo, column), min(halo, row)
+    right, bottom = min(halo, grid.width - column - width), min(halo, grid.height - row - height)
+    around = grid.window(column - left, row - top, width + left + right, height + top + bottom)
+    return around, (slice(top, top + height), slice(left, left + width))
+
+
+def _shift_on(shift: Shift, window: Grid) -> Array:
+    x, y = window.centres(np.arange(window.height), np.arange(window.width))
+    return shift.at(x[None, :], y[:, None])
+
+
+def _count(outcome: Outcome, column: int, row: int, change: Array, before: Array) -> None:
+    known = np.isfinite(change)
+    outcome.valid += int(np.count_nonzero(known))
+    outcome.moved += int(np.count_nonzero(known & (change != 0)))
+    step = outcome.thinning
+    r, c = (-row) % step, (-column) % step
+    part = change[r::step, c::step]
+    if part.size:
+        at = (
+            slice((row + r) // step, (row + r) // step + part.shape[0]),
+            slice((column + c) // step, (column + c) // step + part.shape[1]),
+        )
+        outcome.change[at] = part
+        outcome.height[at] = before[r::step, c::step]

@@ -1,0 +1,162 @@
+"""What is not known about a volume: random, correlated and systematic parts, each a sigma or None when nothing tells it.
+
+Random errors are independent from cell to cell; correlated ones fade with distance; systematic ones are common to all cells:
+what remains of a shift that was fitted, or of the georeferencing (Anderson 2019; Hugonnet et al. 2022).
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contract import decode
+from ..errors import InputError
+from ..frames import LocalFrame, transformer
+from .variogram import pair_sum
+
+Array = NDArray[np.float64]
+GEOREFERENCING = "STRANDLINE_GEOREFERENCING"  # the tag with which a DSM carries its georeferencing's covariance
+SAMPLE = 2500  # cells of a zone whose pairs are summed
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """How the cells' sigmas divide.
+
+    A cell's random sigma is ``random`` times its sigma, its correlated one ``correlated`` times, over the range ``reach``
+    (m; inf: all alike). None: not known.
+    """
+
+    random: float | None
+    correlated: float | None
+    reach: float | None
+
+
+class Systematic(Protocol):
+    """An error common to all cells."""
+
+    def sigma(self, x: float, y: float, before: float, after: float) -> float | None:
+        """Return the sigma (m) of the mean change of a zone with its covered cells' mean place and heights; None: not known."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """The same for every zone: REGISTRATION_SIGMA, or None for "not known"."""
+
+    value: float | None
+
+    def sigma(self, x: float, y: float, before: float, after: float) -> float | None:
+        """Return it."""
+        return self.value
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a shift, or a plane about ``centre``, fitted on stable ground leaves: its covariance (1x1 or 3x3)."""
+
+    covariance: Array
+    centre: tuple[float, float]
+
+    def sigma(self, x: float, y: float, before: float, after: float) -> float | None:
+        """Return sqrt(g' Cov g) with g = 1 or (1, x, y)."""
+        g = np.array([1.0, x - self.centre[0], y - self.centre[1]])[: len(self.covariance)]
+        return float(np.sqrt(max(0.0, g @ self.covariance @ g)))
+
+
+@dataclass(frozen=True)
+class _Block:
+    frame: LocalFrame
+    pivot: tuple[float, ...]
+    covariance: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Georeferenced:
+    """The georeferencing of two models of independent flights."""
+
+    before: _Block
+    after: _Block
+    crs: str  # that of x and y
+
+    def sigma(self, x: float, y: float, before: float, after: float) -> float | None:
+        """Return the propagated sigma of both shifts, tilts and scales at the zone's mean place."""
+        variance = sum(
+            _height_variance(block, self.crs, x, y, height) for block, height in ((self.before, before), (self.after, after))
+        )
+        return float(np.sqrt(variance))
+
+
+def georeferenced(label: str, tags: dict[str, str]) -> _Block | None:
+    """Return the georeferencing that a DSM's tags carry, None when they do not.
+
+    Raises
+    ------
+    InputError
+        When the tag is there but damaged.
+    """
+    text = tags.get(GEOREFERENCING)
+    if not text:
+        return None
+    try:
+        data = json.loads(text)
+        block = decode(_Block, {key: data[key] for key in ("frame", "pivot", "covariance")})
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{label}: the tag {GEOREFERENCING} is damaged ({error}): export the DSM again.") from error
+    if len(block.covariance) != 49 or len(block.pivot) != 3:
+        return None
+    return block
+
+
+def correlated_variance(sample: Array, count: int, squares: float, reach: float) -> float:
+    """Return sum_i sum_k s_i s_k rho(d_ik) over the ``count`` cells of a zone, from a random sample of them.
+
+    ``sample`` (m, 3) holds x, y and s = share times sigma; ``squares`` is the exact sum of s**2 (a cell paired with itself);
+    the pairs of different cells are scaled from the sample's to all (Hugonnet et al. 2022, eq. 18, without its diagonal's bias).
+    """
+    if reach <= 0 or len(sample) < 2:
+        return squares
+    x, y, s = (np.ascontiguousarray(column) for column in sample.T)
+    pairs = float(s.sum()) ** 2 - float(s @ s) if np.isinf(reach) else pair_sum(x, y, s, s, reach)
+    m = len(sample)
+    return squares + max(0.0, pairs) * (count * (count - 1.0)) / (m * (m - 1.0))
+
+
+def fit_covariance(design: Array, place: Array, nugget: float, sill: float, reach: float, count: int) -> Array:
+    """Return the covariance (p, p) of a least-squares fit on ``count`` cells with correlated errors.
+
+    ``design`` (m, p) and ``place`` (m, 2) are a random sample of the cells. Cov = N^-1 X' Sigma X N^-1 with N = X'X and
+    Sigma = nugget I + sill rho.
+    """
+    m, p = design.shape
+    inverse = np.linalg.inv(design.T @ design / m)
+    inner = np.zeros((p, p))
+    x, y = np.ascontiguousarray(place[:, 0]), np.ascontiguousarray(place[:, 1])
+    for i in range(p):
+        for k in range(i, p):
+            left, right = np.ascontiguousarray(design[:, i]), np.ascontiguousarray(design[:, k])
+            same = float(left @ right)
+            if sill > 0 and reach > 0 and m > 1:
+                different = (left.sum() * right.sum() - same) if np.isinf(reach) else pair_sum(x, y, left, right, reach)
+                inner[i, k] = sill * different / (m * (m - 1.0)) * (1.0 - 1.0 / count)
+            inner[i, k] += (nugget + sill) * same / m / count
+            inner[k, i] = inner[i, k]
+    return np.asarray(inverse @ inner @ inverse)
+
+
+def total(*parts: float | None) -> float | None:
+    """Return the root sum of squares; None when a part is not known."""
+    known = [p for p in parts if p is not None]
+    return float(np.sqrt(sum(p * p for p in known))) if len(known) == len(parts) else None
+
+
+def _height_variance(block: _Block, crs: str, x: float, y: float, height: float) -> float:
+    x, y = transformer(crs, block.frame.crs).transform(x, y)
+    local = block.frame.from_crs(np.array([[x, y, height]]))[0]
+    east, north, up = local - np.asarray(block.pivot)
+    # Shift up; a rotation w moves a point by w x r, whose upward part is w_E r_N - w_N r_E; scale lifts by r_U.
+    g = np.array([0.0, 0.0, 1.0, north, -east, 0.0, up])
+    return float(max(0.0, g @ np.reshape(block.covariance, (7, 7)) @ g))
