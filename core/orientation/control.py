@@ -21,6 +21,7 @@ from ..vector import Layer, read_layer
 
 Array = NDArray[np.float64]
 
+_SAME_PLACE = 3.0  # pixels
 _ROLES = {"": "control", "control": "control", "gcp": "control", "check": "check", "checkpoint": "check", "check point": "check"}
 
 
@@ -142,7 +143,7 @@ def control_from(
         GroundPoint(n, c, r, float(s[0]), float(s[1]), tuple(matched[k]))
         for n, k, c, r, s in zip(given.names, keys, coordinates, roles, sigmas, strict=True)
     ]
-    return Control(tuple(points), tuple(notes + unmatched), given.where)
+    return Control(tuple(points), tuple(notes + unmatched + _same_place(points)), given.where)
 
 
 def in_metres(given: Given, crs: str) -> Array:
@@ -259,6 +260,20 @@ def _matched(
         images = _listed(sorted({m.image for m in given.marks}))
         raise InputError(f"No mark of {given.where} matches a point and a photograph of the survey: the marks name {images}.")
     return matched, unmatched.notes()
+
+
+def _same_place(points: Sequence[GroundPoint]) -> list[str]:
+    """Return notes on marks of different points at one place of a photograph: one of them must be wrong."""
+    told, known = [], defaultdict[str, list[tuple[str, Mark]]](list)
+    for point in points:
+        for mark in point.marks:
+            for other, twin in known[mark.image]:
+                if np.hypot(twin.x - mark.x, twin.y - mark.y) < _SAME_PLACE:
+                    told.append(
+                        f"{other} and {point.name} are marked at the same place in {mark.image}: one of the two is wrong."
+                    )
+            known[mark.image].append((point.name, mark))
+    return told
 
 
 def _coordinates(layer: Layer, names: Sequence[str], height_field: str | None) -> Array:

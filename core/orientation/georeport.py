@@ -23,6 +23,10 @@ Array = NDArray[np.float64]
 
 _EDGE_WARNING = 3.0  # times the sigma in the middle of the block
 _NARROW = np.radians(2.0)
+_CAPTION = (
+    "Arrows lead from the given to the computed place, pale bars show the height's error (upwards: computed too high), both "
+    "enlarged as the title says. Open symbols could not be used."
+)
 
 
 def verdict(solution: Solution, result: Result) -> str:
@@ -58,8 +62,8 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
     for seen in solution.seen:
         name = seen.point.name
         if seen.found is None:
-            why = "its rays do not meet" if seen.marks >= 2 else f"it has {seen.marks} mark{'s' * (seen.marks != 1)}"
-            told.append(f"{name} is not used: {why} in oriented photographs; two marks are needed.")
+            few = f"it has {seen.marks} mark{'s' * (seen.marks != 1)} in oriented photographs, and needs two"
+            told.append(f"{name} is not used: {few if seen.marks < 2 else 'its marks do not meet in a point; check them'}.")
             continue
         if seen.wrong:
             told.append(f"The mark of {name} in {', '.join(seen.wrong)} contradicts its other marks and is left out: check it.")
@@ -123,7 +127,7 @@ def report(solution: Solution, inputs: Inputs, result: Result, block: Block, dom
         page.text(f"Doming: {dome.amplitude:+.3g} m from the middle to the outermost point, sigma {dome.sigma:.2g} m.")
     if solution.seen or len(inputs.gnss):
         page.heading("Residuals")
-        page.figure(_map(solution, inputs, block), "Arrows: from the given to the computed place, exaggerated; bars: height.")
+        page.figure(_map(solution, inputs, block), _CAPTION)
     if solution.seen:
         page.table(
             [
@@ -268,13 +272,13 @@ def _map(solution: Solution, inputs: Inputs, block: Block) -> Figure:
     for label, colour, symbol, at, errors, members in groups:
         if not members.any():
             continue
-        axes.plot(at[members, 0], at[members, 1], symbol, color=colour, label=label, markersize=6)
         arrows = members & np.isfinite(errors[:, 0])
+        bare = members & ~arrows
+        axes.plot(at[arrows, 0], at[arrows, 1], symbol, color=colour, label=label, markersize=6)
+        axes.plot(at[bare, 0], at[bare, 1], symbol, color=colour, markersize=6, fillstyle="none", alpha=0.6)
+        axes.vlines(at[arrows, 0], at[arrows, 1], at[arrows, 1] + grow * errors[arrows, 2], color=colour, alpha=0.3, linewidth=4)
         options: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "color": colour, "width": 0.003}
         axes.quiver(at[arrows, 0], at[arrows, 1], grow * errors[arrows, 0], grow * errors[arrows, 1], **options)
-        axes.vlines(at[arrows, 0], at[arrows, 1], at[arrows, 1] + grow * errors[arrows, 2], color=colour, alpha=0.4, linewidth=4)
-    for seen, place in zip(solution.seen, places, strict=True):
-        axes.annotate(seen.point.name, place[:2], xytext=(5, 5), textcoords="offset points", fontsize=8)
     axes.set(xlabel=f"easting - {origin[0]:.0f} m", ylabel=f"northing - {origin[1]:.0f} m", aspect="equal")
     axes.set_title(f"Errors enlarged {grow:g} times", fontsize=10)
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)

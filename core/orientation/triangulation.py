@@ -17,10 +17,12 @@ _AGREE = 5.0  # sigmas of a mark beyond which it is taken for another point
 
 @dataclass(frozen=True)
 class Triangulated:
-    """A point (3,) in the block's frame, its covariance (3, 3) from the marks' sigma, and residuals (m, 2), mark minus
-    projection, in pixels. ``used`` (m,) is False for a mark that the others contradict; ``angle`` is the largest angle (radians)
-    between two used rays. ``agree`` is False when the marks contradict each other and it cannot be told which is wrong.
-    """  # noqa: D205
+    """A point (3,) in the block's frame with its covariance (3, 3).
+
+    ``residuals`` (m, 2) are marks minus projections in pixels. ``used`` (m,) is False for a mark that the others contradict;
+    ``angle`` is the largest angle (radians) between two used rays. ``agree`` is False when marks contradict each other
+    and nothing tells which is wrong.
+    """
 
     point: Array
     covariance: Array
@@ -38,34 +40,39 @@ def triangulate(views: Sequence[View], marks: Array, sigma: float) -> Triangulat
     """
     marks = np.asarray(marks, float)
     used = np.ones(len(views), bool)
-    first = solved = _intersect(views, marks, used)
     limit = _AGREE * sigma
-    while solved is not None and _worst(solved[1], used) > limit and used.sum() > 2:
+    first = solved = _intersect(views, marks, used)
+    while used.sum() > 2 and _worst(solved, used) > limit:
         trials = []
         for i in np.flatnonzero(used):
             rest = used.copy()
             rest[i] = False
             trial = _intersect(views, marks, rest)
             if trial is not None:
-                trials.append((float(np.sum(trial[1][rest] ** 2)), i, trial))
-        if not trials:
+                trials.append((_worst(trial, rest), i, trial))
+        # Two rays nearly always meet somewhere: when several pairs do, nothing tells which mark is wrong.
+        if not trials or (used.sum() == 3 and sum(worst <= limit for worst, *_ in trials) > 1):
             break
         _, i, solved = min(trials, key=lambda t: t[0])
         used[i] = False
-    if solved is not None and used.sum() < len(views) and _worst(solved[1], used) > limit:
+    if _worst(solved, used) > limit:
         used[:], solved = True, first
     if solved is None:
         return None
     point, residuals, normal = solved
+    agree = _worst(solved, used) <= limit
+    # What does not agree is worth what its residuals say.
+    factor = 1.0 if agree else float(np.sum(residuals[used] ** 2)) / sigma**2 / (2 * int(used.sum()) - 3)
     directions = np.array([v.centre - point for v, u in zip(views, used, strict=True) if u])
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     angle = float(np.arccos(np.clip(np.min(directions @ directions.T), -1.0, 1.0)))
-    covariance: Array = np.asarray(np.linalg.inv(normal) * sigma**2, float)
-    return Triangulated(point, covariance, residuals, used, angle, _worst(residuals, used) <= limit)
+    covariance: Array = np.asarray(np.linalg.inv(normal) * sigma**2 * max(factor, 1.0), float)
+    return Triangulated(point, covariance, residuals, used, angle, agree)
 
 
-def _worst(residuals: Array, used: NDArray[np.bool_]) -> float:
-    return float(np.max(np.linalg.norm(residuals[used], axis=1)))
+def _worst(solved: tuple[Array, Array, Array] | None, used: NDArray[np.bool_]) -> float:
+    """Return the largest residual of the used marks, infinite when their rays do not meet."""
+    return np.inf if solved is None else float(np.max(np.linalg.norm(solved[1][used], axis=1)))
 
 
 def _intersect(views: Sequence[View], marks: Array, used: NDArray[np.bool_]) -> tuple[Array, Array, Array] | None:
