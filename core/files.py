@@ -14,6 +14,7 @@ from typing import Any
 from .contract import encode
 
 PART = ".part-"  # marks what is not finished; whoever holds the survey may remove it
+_OLD = f"{PART}old-"  # marks a folder that is being replaced
 
 
 @contextmanager
@@ -29,7 +30,7 @@ def whole(path: Path | str) -> Iterator[Path]:
     try:
         yield part
         if part.is_dir() and target.is_dir():
-            old = target.with_name(f"{PART}{os.getpid()}-old-{target.name}")
+            old = target.with_name(f"{_OLD}{os.getpid()}-{target.name}")
             target.rename(old)
             part.rename(target)
             remove(old)
@@ -58,8 +59,9 @@ def remove(path: Path) -> None:
 def remove_parts(folder: Path) -> None:
     """Remove what killed runs left unfinished directly in ``folder``; put back a folder caught between two renames."""
     for path in folder.glob(f"{PART}*"):
-        _, _, name = path.name.partition("-old-")
-        if name and not (folder / name).exists():
+        _, old, rest = path.name.partition(_OLD)
+        name = rest.partition("-")[2]
+        if old and name and not (folder / name).exists():
             path.rename(folder / name)
         else:
             remove(path)
@@ -75,6 +77,11 @@ def file_digest(path: Path | str) -> str:
     """Return a fingerprint (32 hex digits) of a file's content."""
     with Path(path).open("rb") as stream:
         return hashlib.file_digest(stream, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+
+
+def bytes_digest(data: bytes) -> str:
+    """Return the fingerprint that ``file_digest`` has of a file with this content."""
+    return hashlib.blake2b(data, digest_size=16).hexdigest()
 
 
 def _sync(path: Path) -> None:

@@ -14,10 +14,10 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
-from .contract import decode
+from .contract import decode, encode
 from .errors import InputError
 from .files import file_digest, remove_parts, write_json
 
@@ -108,17 +108,28 @@ class Survey:
             raise InputError(f"{path} is damaged ({error}): run 'Create survey' again.") from error
         if version != VERSION:
             raise InputError(f"{path} is of version {version}, this engine reads {VERSION}: update Strandline.")
-        return cls(Path(folder), decode(_Content, data))
+        content = decode(_Content, data)
+        for photograph in content.photographs:
+            # A survey may come from a stranger; names become paths of files that steps write.
+            if not _is_inside(photograph.name):
+                raise InputError(f"{path} names a photograph outside its folder, {photograph.name!r}: do not use this survey.")
+        return cls(Path(folder), content)
 
     @classmethod
     def create(cls, folder: Path | str, images: Path | str, crs: str | None, photographs: list[Photograph]) -> Survey:
-        """Write a survey into ``folder``; steps of a survey that stood there are kept and may become stale."""
+        """Write a survey into ``folder``; steps of a survey that stood there are kept and may become stale.
+
+        When the photographs or the CRS are others than before, they are stale from here on until ``createsurvey`` is finished.
+        """
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
+        ordered = tuple(sorted(photographs, key=lambda p: p.name))
         steps: dict[str, StepRecord] = {}
         if (target / _FILE).is_file():
-            steps = cls.open(target)._content.steps
-        survey = cls(target, _Content(VERSION, _portable(Path(images), target), crs, tuple(photographs), steps))
+            former = cls.open(target)._content
+            same = (former.photographs, former.crs) == (ordered, crs)
+            steps = {k: v for k, v in former.steps.items() if same or k != "createsurvey"}
+        survey = cls(target, _Content(VERSION, _portable(Path(images), target), crs, ordered, steps))
         survey._write()
         return survey
 
@@ -199,8 +210,11 @@ class Survey:
         """Record that ``step`` is done. Call it last, when all its files are in place."""
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         inputs = {earlier: record.fingerprint for earlier in built_on if (record := self.record(earlier))}
-        record = StepRecord(fingerprint, inputs, parameters, result, now)
-        self._content = replace(self._content, steps={**self._content.steps, step: record})
+        # As JSON, as it will be read again.
+        record = StepRecord(fingerprint, inputs, encode(parameters), encode(result), now)
+        # The folder may have been opened before it was held; what another step finished in between is kept.
+        standing = Survey.open(self.folder)._content
+        self._content = replace(standing, steps={**standing.steps, step: record})
         self._write()
 
     def forget(self, step: str) -> None:
@@ -272,6 +286,12 @@ def verify(path: Path, photograph: Photograph) -> None:
     """
     if file_digest(path) != photograph.digest:
         raise InputError(f"The photograph {path} has changed since the survey was made: run 'Create survey' again.")
+
+
+def _is_inside(name: str) -> bool:
+    """Tell whether a name is a relative path that does not lead out of its folder."""
+    path = PurePath(name)
+    return bool(path.parts) and not path.drive and not path.root and ".." not in path.parts
 
 
 def _portable(path: Path, base: Path) -> str:

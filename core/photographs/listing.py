@@ -1,0 +1,90 @@
+"""Finding the photographs of a flight in a folder: which files, under which names, one per exposure."""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from fnmatch import fnmatchcase
+from pathlib import Path, PurePosixPath
+
+from ..errors import InputError
+from .reading import DECODABLE, RAW
+
+_SHOWN = 8
+
+
+def list_photographs(images: Path, pattern: str | None, outside: Path) -> list[str]:
+    """Return the names (paths relative to ``images``, with forward slashes) of the photographs in it, sorted.
+
+    Parameters
+    ----------
+    images
+        The folder; its sub-folders are searched too. Hidden files and folders, and survey folders, are passed over.
+    pattern
+        A glob that the file's name or its relative path must match, upper and lower case alike; None for all.
+    outside
+        A folder to pass over: the survey's own.
+
+    Raises
+    ------
+    InputError
+        When there is no photograph, or there is more than one file of an exposure.
+    """
+    if not images.is_dir():
+        raise InputError(f"IMAGES is not a folder: {images}.")
+    if (images / "survey.json").is_file():
+        raise InputError(f"IMAGES is a survey folder, not a folder of photographs: {images}.")
+    found = sorted(_walk(images, outside.resolve()))
+    if not found:
+        kinds = ", ".join(sorted(s[1:] for s in DECODABLE | RAW))
+        raise InputError(f"There is no photograph in {images} (files ending in {kinds}): choose another folder.")
+    names = [n for n in found if pattern is None or _matches(n, pattern)]
+    if not names:
+        raise InputError(f"None of the {len(found)} photographs in {images} matches FILTER={pattern!r}: try '*.jpg'.")
+    _refuse_twins(names)
+    return names
+
+
+def is_raw(name: str) -> bool:
+    """Tell whether a photograph of this name is a RAW file."""
+    return PurePosixPath(name).suffix.casefold() in RAW
+
+
+def some(names: Iterable[str]) -> str:
+    """Return names as one phrase, the first few of many."""
+    every = list(names)
+    rest = len(every) - _SHOWN
+    return ", ".join(every[:_SHOWN]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def _walk(images: Path, outside: Path) -> Iterator[str]:
+    seen: set[str] = set()  # a link to a folder above would lead round for ever
+    for folder, folders, files in os.walk(images, followlinks=True):
+        place = Path(folder)
+        real = os.path.realpath(place)
+        if real in seen or Path(real) == outside or (place / "survey.json").is_file():
+            folders.clear()
+            continue
+        seen.add(real)
+        folders[:] = [f for f in folders if not f.startswith((".", "$"))]
+        for file in files:
+            # macOS leaves hidden companions ("._DJI_0001.JPG") on memory cards.
+            if not file.startswith(".") and Path(file).suffix.casefold() in DECODABLE | RAW:
+                yield (place / file).relative_to(images).as_posix()
+
+
+def _matches(name: str, pattern: str) -> bool:
+    wanted = pattern.strip().casefold().replace("\\", "/")
+    return any(fnmatchcase(n, wanted) for n in (name.casefold(), PurePosixPath(name).name.casefold()))
+
+
+def _refuse_twins(names: list[str]) -> None:
+    exposures = defaultdict(list)
+    for name in names:
+        exposures[PurePosixPath(name).with_suffix("").as_posix().casefold()].append(name)
+    twins = [" and ".join(n) for n in exposures.values() if len(n) > 1]
+    if twins:
+        raise InputError(
+            f"There is more than one file of {len(twins)} exposures ({some(twins)}): pick one kind with FILTER, such as '*.jpg'."
+        )

@@ -1,0 +1,166 @@
+"""Decoding photographs, and telling the whole from the broken.
+
+Pixels are those of the stored frame: the EXIF orientation is never applied.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from PIL import Image
+
+from ..errors import InputError
+from ..files import bytes_digest
+from ..survey import Photograph
+
+JPG = frozenset({".jpg", ".jpeg", ".jpe"})
+TIFF = frozenset({".tif", ".tiff"})
+PNG = frozenset({".png"})
+_RAW = "3fr arw cr2 cr3 crw dng erf fff iiq kdc mos mrw nef nrw orf pef raf raw rw2 rwl sr2 srw x3f"
+RAW = frozenset(f".{kind}" for kind in _RAW.split())
+DECODABLE = JPG | TIFF | PNG
+
+# In entropy-coded data 0xFF is followed by 0x00, by a restart marker, or by more 0xFF; anything else is a marker.
+_MARKER = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
+
+
+@dataclass(frozen=True)
+class ChannelSum:
+    """The sum of a photograph's colour channels, in digital numbers (DN).
+
+    ``values`` (rows, columns) are uint16 for 8-bit photographs and uint32 for 16-bit ones; ``white`` is the
+    largest value that can occur: ``channels * 255`` or ``channels * 65535``. The sum keeps what an 8-bit luma
+    rounds away: up to log2(3) = 1.6 bits where the three channels see one grey signal, as on sand.
+    """
+
+    values: NDArray[Any]
+    channels: int
+    white: int
+
+
+def decode_photograph(path: Path, photograph: Photograph) -> NDArray[Any]:
+    """Return a photograph's pixels, see ``decode_pixels``, after making sure that they are those the survey lists.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or decoded, or has changed.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"The photograph {path} cannot be read ({error.strerror}): put it back.") from error
+    if bytes_digest(data) != photograph.digest:
+        raise InputError(f"The photograph {path} has changed since the survey was made: run 'Create survey' again.")
+    try:
+        return decode_pixels(data)
+    except ValueError as error:
+        raise InputError(f"The photograph {path} is {error}: copy it again from the camera.") from error
+
+
+def decode_pixels(data: bytes) -> NDArray[Any]:
+    """Return the pixels (rows, columns) or (rows, columns, channels) in BGR order, uint8 or uint16, alpha dropped.
+
+    Raises
+    ------
+    ValueError
+        In a few words, when ``data`` is not a whole JPG, TIFF or PNG of 8 or 16 bits a channel.
+    """
+    if not data:
+        raise ValueError("empty")
+    try:
+        # "Unchanged" keeps the depth and the stored orientation.
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
+        raise ValueError("truncated or not an image") from error
+    if pixels is None:
+        raise ValueError("truncated or not an image")
+    if pixels.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"of {pixels.dtype} pixels, not of 8 or 16 bits a channel")
+    if pixels.ndim == 3 and pixels.shape[2] in (2, 4):
+        pixels = pixels[:, :, :-1]
+    return pixels[:, :, 0] if pixels.ndim == 3 and pixels.shape[2] == 1 else pixels
+
+
+def channel_sum(pixels: NDArray[Any]) -> ChannelSum:
+    """Return the sum of the channels of ``pixels`` (rows, columns) or (rows, columns, channels)."""
+    stack = pixels[:, :, None] if pixels.ndim == 2 else pixels
+    values = np.empty(stack.shape[:2], np.uint16 if pixels.dtype == np.uint8 else np.uint32)
+    _add_channels(stack, values)
+    return ChannelSum(values, stack.shape[2], stack.shape[2] * int(np.iinfo(pixels.dtype).max))
+
+
+@njit(cache=True)
+def _add_channels(stack: NDArray[Any], out: NDArray[Any]) -> None:
+    rows, columns, channels = stack.shape
+    for r in range(rows):
+        if channels == 3:  # written out, so that the compiler can use vector instructions
+            for c in range(columns):
+                out[r, c] = np.uint32(stack[r, c, 0]) + np.uint32(stack[r, c, 1]) + np.uint32(stack[r, c, 2])
+        else:
+            for c in range(columns):
+                total = np.uint32(0)
+                for k in range(channels):
+                    total += np.uint32(stack[r, c, k])
+                out[r, c] = total
+
+
+def mean_level(photograph: ChannelSum) -> NDArray[np.uint8]:
+    """Return the mean of the channels at 8 bits (rows, columns), rounded."""
+    table = np.floor(255.0 * np.arange(photograph.white + 1) / photograph.white + 0.5).astype(np.uint8)
+    return table[photograph.values]
+
+
+def frame_size(data: bytes) -> tuple[int, int]:
+    """Return width and height of a photograph after making sure that it is whole.
+
+    A JPG must run from marker to marker to its end of image, which finds a file cut short wherever the cut lies, and
+    must decode at an eighth of its size, which takes less than half the time of a full decoding; a TIFF or PNG is decoded.
+
+    Raises
+    ------
+    ValueError
+        In a few words, when it is empty, truncated, or no image.
+    """
+    if not data.startswith(b"\xff\xd8"):
+        pixels = decode_pixels(data)
+        return pixels.shape[1], pixels.shape[0]
+    if not _reaches_end_of_image(data):
+        raise ValueError("truncated")
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            size = image.size
+            image.draft(None, (size[0] // 8, size[1] // 8))
+            image.load()
+    except (OSError, SyntaxError, ValueError) as error:
+        raise ValueError(f"not decodable, {error}") from error
+    return size
+
+
+def _reaches_end_of_image(data: bytes) -> bool:
+    """Tell whether a JPG's segments lead to its own end of image, not to that of a thumbnail or of a second image."""
+    place = 2
+    while place + 1 < len(data) and data[place] == 0xFF:
+        marker = data[place + 1]
+        if marker == 0xD9:
+            return True
+        if marker == 0xFF:  # padding
+            place += 1
+        elif marker == 0x01 or 0xD0 <= marker <= 0xD7:  # without content
+            place += 2
+        else:
+            place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+            if marker == 0xDA:
+                following = _MARKER.search(data, place)
+                if following is None:
+                    return False
+                place = following.start()
+    return False
