@@ -35,8 +35,11 @@ def projected_crs(text: str) -> CRS:
         raise InputError(f"The CRS {text!r} is not understood: choose a projected CRS in metres.") from error
     if crs.is_compound:
         crs = CRS(crs.sub_crs_list[0])
+    crs = crs.to_2d()
     if not crs.is_projected:
         raise InputError(f"The CRS {crs.name} is not projected: choose a projected CRS in metres (UTM or a national grid).")
+    if {axis.direction for axis in crs.axis_info} & {"west", "south"}:
+        raise InputError(f"The axes of the CRS {crs.name} do not point east and north: choose a projected CRS whose axes do.")
     factor = crs.axis_info[0].unit_conversion_factor
     if abs(factor - 1.0) > 1e-9:
         raise InputError(
@@ -73,31 +76,42 @@ class LocalFrame:
 
     @classmethod
     def at(cls, crs: str, easting: float, northing: float, height: float) -> LocalFrame:
-        """Return the frame whose origin is at the given coordinates of ``crs``."""
+        """Return the frame whose origin is at the given coordinates of ``crs``.
+
+        Raises
+        ------
+        InputError
+            When the CRS does not suit, or the coordinates lie outside its area.
+        """
         definition = projected_crs(crs)
         to_geographic = Transformer.from_crs(definition, definition.geodetic_crs, always_xy=True)
-        longitude, latitude = to_geographic.transform(easting, northing)
+        longitude, latitude = np.array(to_geographic.transform(easting, northing)) * _degrees_per_unit(definition)
+        if not np.isfinite([longitude, latitude, height]).all():
+            raise InputError(f"The point {easting:g}, {northing:g} lies outside the area of {definition.name}: check the CRS.")
         return cls(definition.to_wkt(), float(longitude), float(latitude), float(height))
 
     def from_crs(self, points: Array) -> Array:
         """Return local (n, 3) of easting, northing, height (n, 3)."""
         points = np.asarray(points, float)
         longitude, latitude = self._projection.transform(points[:, 0], points[:, 1], direction="INVERSE")
-        return self._local(np.stack([longitude, latitude, points[:, 2]], axis=1))
+        unit = _degrees_per_unit(self._definition)
+        return self._local(np.stack([longitude * unit, latitude * unit, points[:, 2]], axis=1))
 
     def to_crs(self, points: Array) -> Array:
         """Return easting, northing, height (n, 3) of local (n, 3)."""
         centre, axes = self._base
         x, y, z = (np.asarray(points, float) @ axes + centre).T
         longitude, latitude, height = self._geocentric.transform(x, y, z, direction="INVERSE")
-        easting, northing = self._projection.transform(longitude, latitude)
+        unit = _degrees_per_unit(self._definition)
+        easting, northing = self._projection.transform(longitude / unit, latitude / unit)
         return np.stack([easting, northing, height], axis=1)
 
     def from_wgs84(self, points: Array) -> Array:
         """Return local (n, 3) of WGS 84 longitude, latitude (degrees) and height (n, 3); heights pass unchanged."""
         points = np.asarray(points, float)
-        longitude, latitude = self._from_wgs84.transform(points[:, 0], points[:, 1])
-        return self._local(np.stack([longitude, latitude, points[:, 2]], axis=1))
+        # By way of the projection, which alone knows of a shift of datum in a PROJ string.
+        easting, northing = self._from_wgs84.transform(points[:, 0], points[:, 1])
+        return self.from_crs(np.stack([easting, northing, points[:, 2]], axis=1))
 
     def affine(self, centre: Array, reach: float) -> tuple[Array, Array]:
         """Return (matrix, offset) with ``local = matrix @ (crs - centre) + offset`` near ``centre`` (easting, northing, height).
@@ -124,7 +138,7 @@ class LocalFrame:
 
     @cached_property
     def _from_wgs84(self) -> Transformer:
-        return transformer("EPSG:4326", CRS(self._definition.geodetic_crs))
+        return transformer("EPSG:4326", self._definition)
 
     @cached_property
     def _geocentric(self) -> Transformer:
@@ -145,3 +159,9 @@ class LocalFrame:
         north = [-np.sin(phi) * np.cos(lam), -np.sin(phi) * np.sin(lam), np.cos(phi)]
         up = [np.cos(phi) * np.cos(lam), np.cos(phi) * np.sin(lam), np.sin(phi)]
         return centre, np.array([east, north, up])
+
+
+def _degrees_per_unit(crs: CRS) -> float:
+    """Return the degrees in a unit of the CRS's geographic base: 0.9 for the grads of old French maps."""
+    base = crs.geodetic_crs
+    return 1.0 if base is None else float(np.degrees(base.axis_info[0].unit_conversion_factor))
