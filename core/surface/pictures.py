@@ -1,0 +1,68 @@
+"""The original photographs, reduced to the size a level needs, a few of them kept at hand in each worker."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Floats = NDArray[np.float32]
+
+COARSEST = 6  # the strongest reduction: 1 / 2**6
+_DECODER = {0: cv2.IMREAD_COLOR, 1: cv2.IMREAD_REDUCED_COLOR_2, 2: cv2.IMREAD_REDUCED_COLOR_4, 3: cv2.IMREAD_REDUCED_COLOR_8}
+
+
+class Pictures:
+    """Reads photographs at 1 / 2**level of their size and keeps the last read, up to ``limit`` bytes."""
+
+    def __init__(self, limit: int = 400_000_000) -> None:
+        self._limit, self._kept = limit, OrderedDict[tuple[str, int], NDArray[Any]]()
+
+    def get(self, path: str, level: int) -> NDArray[Any]:
+        """Return a photograph (rows, columns, 3: red, green, blue), as stored, never rotated."""
+        key = (path, level)
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        picture = read_reduced(path, level)
+        self._kept[key] = picture
+        while len(self._kept) > 1 and sum(p.nbytes for p in self._kept.values()) > self._limit:
+            self._kept.popitem(last=False)
+        return picture
+
+
+def read_reduced(path: str, level: int) -> NDArray[Any]:
+    """Return the photograph (rows, columns, 3: red, green, blue) at 1 / 2**``level`` of its size; sizes are rounded up.
+
+    JPEG is reduced while it is decoded, as far as it can be; the rest are means over whole squares of pixels, so that
+    pixel (i, j) covers the same ground as the square it stands for.
+
+    Raises
+    ------
+    InputError
+        When it cannot be decoded.
+    """
+    jpeg = Path(path).suffix.lower() in (".jpg", ".jpeg")
+    decoded = min(level, 3) if jpeg else 0
+    flags = _DECODER[decoded] | cv2.IMREAD_IGNORE_ORIENTATION | cv2.IMREAD_ANYDEPTH
+    picture = cv2.imread(path, flags)
+    if picture is None:
+        raise InputError(f"The photograph {path} cannot be decoded: put a sound copy in its place, or leave it out.")
+    square = 2 ** (level - decoded)
+    if square > 1:
+        rows, columns = (-(-n // square) * square for n in picture.shape[:2])
+        picture = cv2.copyMakeBorder(picture, 0, rows - picture.shape[0], 0, columns - picture.shape[1], cv2.BORDER_REPLICATE)
+        picture = cv2.resize(picture, (columns // square, rows // square), interpolation=cv2.INTER_AREA)
+    return np.ascontiguousarray(picture[:, :, ::-1])
+
+
+def grey(picture: NDArray[Any]) -> Floats:
+    """Return the mean of the channels in 8-bit grey levels: no luma, whose rounding would cost sand half a bit."""
+    scale = 255.0 / np.iinfo(picture.dtype).max / 3.0
+    return (picture.sum(axis=2, dtype=np.float32) * np.float32(scale)).astype(np.float32)
