@@ -59,9 +59,7 @@ def plan(length: float, width: float, footprint: tuple[float, float], forward: f
     return Plan(np.array(places), np.array(headings), base, spacing)
 
 
-def fly(
-    flight: Plan, camera: Camera, height: float, tilt: float, names: list[str], random: np.random.Generator
-) -> list[View]:
+def fly(flight: Plan, camera: Camera, height: float, tilt: float, names: list[str], random: np.random.Generator) -> list[View]:
     """Return the true views in beach coordinates: nadir with the image's top forward, but for jitter.
 
     ``height`` is above z = 0 (m); ``tilt`` is the sigma (rad) of the gimbal's error about each of the image's axes. A
@@ -97,8 +95,8 @@ def footprint_bounds(views: list[View], lowest: float) -> tuple[float, float, fl
 def expected_precision(views: list[View], points: Array, sigma: float) -> tuple[Array, NDArray[np.int64]]:
     """Return sigma_Z (n,; m, NaN where fewer than two views see a point) and the number of views (n,) of points (n, 3).
 
-    Normal case: ``sigma_Z = sigma GSD H / sqrt(sum |b_i - mean b|^2)`` with image coordinates good to ``sigma`` pixels and b_i the
-    places of the views that see the point, in both directions of the plane, since x and y both tell of the height.
+    Normal case: ``sigma_Z = sigma GSD H / sqrt(sum |b_i - mean b|^2)`` with image coordinates good to ``sigma`` pixels and
+    b_i the places of the views that see the point, in both directions of the plane, since x and y both tell of the height.
     """
     camera = views[0].camera
     focal = camera.brown()[:2].mean()
@@ -122,7 +120,7 @@ def _stations(extent: float, footprint: float, step: float, seen: int) -> Array:
     """Return evenly spaced places, centred on 0..``extent``, whose ``seen`` outermost still see its end."""
     reach = (extent - footprint) / 2 + (seen - 1) * step
     count = max(seen, math.ceil(2 * reach / step - 1e-9) + 1)
-    return extent / 2 + (np.arange(count) - (count - 1) / 2) * step
+    return np.asarray(extent / 2 + (np.arange(count) - (count - 1) / 2) * step, float)
 
 
 def _rotation(vector: Array) -> Array:

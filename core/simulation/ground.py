@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..block import View
 from ..errors import InputError
+from .placement import Placement
 from .rendering import Scene
 from .terrain import Beach
 
@@ -59,7 +60,7 @@ def lay_targets(beach: Beach, after: bool, control: int, check: int, side: float
     for k in range(count):
         best = int(np.argmin(distance)) if k == 0 else int(np.argmax(nearest))
         if not len(places) or nearest[best] < 3 * side:
-            raise InputError(f"The area has no room for {count} targets of {side:.1f} m: ask for fewer, or enlarge LENGTH and WIDTH.")
+            raise InputError(f"The area has no room for {count} targets of {side:.1f} m: ask for fewer, or enlarge the area.")
         chosen.append(best)
         nearest = np.minimum(nearest, np.hypot(*(places - places[best]).T))
     spots = places[chosen]
@@ -67,6 +68,14 @@ def lay_targets(beach: Beach, after: bool, control: int, check: int, side: float
     names = [f"G{k + 1}" for k in range(control)] + [f"C{k + 1}" for k in range(check)]
     roles = ["control"] * control + ["check"] * check
     return Targets(names, roles, points, random.uniform(0, np.pi / 2, count))
+
+
+def measure(targets: Targets, placement: Placement, random: np.random.Generator) -> Array:
+    """Return the coordinates (n, 3) in the CRS as a surveyor finds them, with errors of ``SIGMA_H`` and ``SIGMA_V``."""
+    if not targets.names:
+        return np.empty((0, 3))
+    local = placement.to_local(targets.points)
+    return placement.frame.to_crs(local + np.array([SIGMA_H, SIGMA_H, SIGMA_V]) * random.standard_normal(local.shape))
 
 
 @dataclass(frozen=True)
@@ -79,7 +88,7 @@ class Mark:
     y: float
 
 
-def mark(targets: Targets, views: list[View], scene: Scene, steepest: float, top: float, random: np.random.Generator) -> list[Mark]:
+def mark(targets: Targets, views: list[View], scene: Scene, random: np.random.Generator) -> list[Mark]:
     """Return the marks of every target wholly in a photograph and not hidden, measured to ``SIGMA_MARK``."""
     marks = []
     for view in views:
@@ -92,7 +101,7 @@ def mark(targets: Targets, views: list[View], scene: Scene, steepest: float, top
             inside = ((pixels > edge) & (pixels < (camera.width - edge, camera.height - edge))).all(axis=1)
         errors = random.standard_normal(pixels.shape) * SIGMA_MARK
         found = np.full_like(targets.points, np.inf)
-        found[inside] = scene.hit(view, pixels[inside], steepest, top)
+        found[inside] = scene.hit(view, pixels[inside])
         hidden = np.linalg.norm(found - targets.points, axis=1) > 0.05
         for k in np.flatnonzero(inside & ~hidden):
             x, y = pixels[k] + errors[k]

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 DEFAULT_CRS = "EPSG:32630"
 _DEFAULT_PLACE = (-1.2548, 44.4521)  # a sandy coast that faces west
 _SEA = 48.9  # m, ellipsoidal height of the sea
-_AZIMUTH = math.radians(8.0)  # of the shore, clockwise from true north; the sea lies to the left
+_AZIMUTH = math.radians(8.0)
 _LATTICE = 64  # cells between exact transformations; the curvature neglected between is below 2 um
 
 
@@ -50,6 +50,11 @@ class Placement:
                 place = ((area.west + area.east) / 2, (area.south + area.north) / 2)
         easting, northing = Transformer.from_crs(definition.geodetic_crs, definition, always_xy=True).transform(*place)
         return cls(LocalFrame.at(definition.to_wkt(), round(easting), round(northing), _SEA), beach.length, beach.width)
+
+    @property
+    def azimuth(self) -> float:
+        """The direction of the shore (rad, clockwise from true north); the sea lies to the left."""
+        return _AZIMUTH
 
     @cached_property
     def axes(self) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numba import njit
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..block import View
 from .noise import noise
-from .terrain import grain_count, height_at, reflectance_at
+from .terrain import Beach, grain_count, height_at, reflectance_at
 
 Array = NDArray[np.float64]
 
@@ -43,93 +43,102 @@ class Light:
     azimuth: float
     elevation: float
 
+    @property
+    def direction(self) -> Array:
+        """The unit vector (3,) towards the sun."""
+        flat = math.cos(self.elevation)
+        return np.array([flat * math.cos(self.azimuth), flat * math.sin(self.azimuth), math.sin(self.elevation)])
 
-def new_arrays(folder: Path, field: Field) -> None:
-    """Make the two files that ``fill_heights`` and ``fill_radiance`` fill."""
-    np.lib.format.open_memmap(folder / "heights.npy", "w+", np.float32, (field.rows, field.columns))
-    shape = (field.rows * FINE, field.columns * FINE)
-    np.lib.format.open_memmap(folder / "radiance.npy", "w+", np.uint16, shape)
+
+@dataclass(frozen=True)
+class Fields:
+    """Where the fields of one date are kept while photographs are rendered, and what they show."""
+
+    folder: str
+    field: Field
+    beach: Beach
+    after: bool
+    light: Light
+
+    def create(self) -> None:
+        """Make the two files that ``fill`` fills, empty."""
+        f = self.field
+        for name, kind, fine in (("heights.npy", np.float32, 1), ("radiance.npy", np.uint16, FINE)):
+            np.lib.format.open_memmap(Path(self.folder) / name, "w+", kind, (f.rows * fine, f.columns * fine))
+
+    def open(self, mode: Literal["r", "r+"]) -> tuple[Any, Any]:
+        """Map heights and radiance; pages are shared between processes."""
+        heights, radiance = (np.load(Path(self.folder) / name, mmap_mode=mode) for name in ("heights.npy", "radiance.npy"))
+        return heights, radiance
 
 
-def fill_heights(folder: str, field: Field, start: int, end: int, shape: tuple[float, float, float, int], after: bool) -> None:
-    """Compute the rows from ``start`` to ``end`` of the heights; ``shape`` is the beach's."""
-    heights = np.load(Path(folder) / "heights.npy", mmap_mode="r+")
-    _heights(heights[start:end], field.a, field.c + start * field.cell, field.cell, *shape, after)
+def fill(fields: Fields, start: int, end: int) -> None:
+    """Compute the rows of heights from ``start`` to ``end`` and the radiance that belongs to them."""
+    f, beach = fields.field, fields.beach
+    heights, radiance = fields.open("r+")
+    length, across, relief, seed = beach.shape
+    band = np.empty((end - start + 3, f.columns))  # with a row before and two behind, for the slope
+    c = f.c + (start - 1) * f.cell
+    _heights(band, f.a, c, f.cell, length, across, relief, seed, fields.after)
+    heights[start:end] = band[1:-2]
+    sun = fields.light.direction
+    out = np.empty(((end - start) * FINE, f.columns * FINE), np.uint16)
+    finest = 1.5 * f.cell
+    texture = (across, seed, fields.after, beach.contrast, finest, grain_count(finest))
+    _radiance(band, out, f.a, c, f.cell, sun, *texture)
+    radiance[start * FINE : end * FINE] = out
     heights.flush()
-
-
-def fill_radiance(
-    folder: str, field: Field, start: int, end: int, shape: tuple[float, float, float, int], after: bool, contrast: float, light: Light
-) -> None:
-    """Compute the radiance that belongs to the rows of heights from ``start`` to ``end``."""
-    heights = np.load(Path(folder) / "heights.npy", mmap_mode="r")
-    radiance = np.load(Path(folder) / "radiance.npy", mmap_mode="r+")
-    sun = np.array(
-        [
-            math.cos(light.elevation) * math.cos(light.azimuth),
-            math.cos(light.elevation) * math.sin(light.azimuth),
-            math.sin(light.elevation),
-        ]
-    )
-    finest = 1.5 * field.cell
-    _radiance(
-        heights, radiance, start, end, field.a, field.c, field.cell, shape[1], shape[3], after, contrast, finest, grain_count(finest), sun
-    )
     radiance.flush()
 
 
 @dataclass(frozen=True)
 class Scene:
-    """The fields of one date in memory, and the painted targets: a, c, cosine, sine of each one's turn (n, 4), half a side."""
+    """The fields of one date in memory, and the painted targets: a, c, cosine, sine of each one's turn (n, 4), half a side.
+
+    ``top`` and ``steepest`` bound the height and slope of the bilinear surface, so that marching along a ray can not
+    step over its first hit.
+    """
 
     field: Field
     heights: NDArray[np.float32]
     radiance: NDArray[np.uint16]
     targets: Array
     half: float
+    top: float
+    steepest: float
 
     @classmethod
-    def load(cls, folder: str, field: Field, targets: Array, half: float) -> Scene:
-        """Map the files of ``folder``; pages are shared between processes."""
-        heights = np.load(Path(folder) / "heights.npy", mmap_mode="r")
-        radiance = np.load(Path(folder) / "radiance.npy", mmap_mode="r")
-        return cls(field, heights, radiance, targets, half)
+    def of(cls, field: Field, heights: NDArray[np.float32], radiance: NDArray[np.uint16], targets: Array, half: float) -> Scene:
+        """Return the scene with its bounds."""
+        along = np.abs(np.diff(heights, axis=1)).max()
+        across = np.abs(np.diff(heights, axis=0)).max()
+        return cls(field, heights, radiance, targets, half, float(heights.max()), math.hypot(along, across) / field.cell)
 
-    def render(self, view: View, sea: int, steepest: float, top: float) -> NDArray[np.float32]:
+    def render(self, view: View, sea: int) -> NDArray[np.float32]:
         """Return the light on each pixel (3, rows, columns): of sand, paint and sea, relative to dry flat sand.
 
-        ``view`` is in beach coordinates; ``sea`` seeds the water of this moment; ``steepest`` and ``top`` bound the
-        slope and height of the heights field, so that marching along a ray can not step over its first hit.
+        ``view`` is in beach coordinates; ``sea`` seeds the water of this moment.
         """
         camera = view.camera
-        columns, rows = -(-camera.width // _LATTICE) + 1, -(-camera.height // _LATTICE) + 1
-        mesh = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2) * float(_LATTICE)
-        rays = camera.unproject(mesh)[:, :2].reshape(rows, columns, 2)
+        x = np.arange(-(-camera.width // _LATTICE) + 1, dtype=float) * _LATTICE
+        y = np.arange(-(-camera.height // _LATTICE) + 1, dtype=float) * _LATTICE
+        mesh = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        rays = camera.unproject(mesh)[:, :2].reshape(len(y), len(x), 2)
         out = np.zeros((_PLANES, camera.height, camera.width), np.float32)
-        f = self.field
-        _render(
-            self.heights, self.radiance, f.a, f.c, f.cell, top, steepest,
-            view.centre, np.ascontiguousarray(view.rotation.T), rays, self.targets, self.half, sea, out,
-        )  # fmt: skip
+        f, axes = self.field, np.ascontiguousarray(view.rotation.T)
+        ground = (self.heights, self.radiance, f.a, f.c, f.cell, self.top, self.steepest)
+        _render(*ground, view.centre, axes, rays, self.targets, self.half, sea, out)
         return out
 
-    def hit(self, view: View, pixels: Array, steepest: float, top: float) -> Array:
+    def hit(self, view: View, pixels: Array) -> Array:
         """Return the points (n, 3) of the surface that ``pixels`` (n, 2) of ``view`` show."""
         rays = view.camera.unproject(pixels) @ view.rotation
         f, points = self.field, np.empty((len(rays), 3))
         for i, ray in enumerate(rays):
             mx, my = ray[0] / -ray[2], ray[1] / -ray[2]
-            t = _trace(self.heights, f.a, f.c, 1 / f.cell, *view.centre, mx, my, top, steepest)
+            t = _trace(self.heights, f.a, f.c, 1 / f.cell, *view.centre, mx, my, self.top, self.steepest)
             points[i] = view.centre + t * np.array([mx, my, -1.0])
         return points
-
-
-def bounds(heights: NDArray[np.float32], start: int, end: int) -> tuple[float, float]:
-    """Return the largest height and a bound of the slope of the bilinear surface, in units per cell, over some rows."""
-    part = np.asarray(heights[start : end + 1])
-    along = np.abs(np.diff(part, axis=1)).max(initial=0.0)
-    across = np.abs(np.diff(part, axis=0)).max(initial=0.0)
-    return float(part.max()), float(math.hypot(along, across))
 
 
 @njit(cache=True, nogil=True)
@@ -143,21 +152,21 @@ def _heights(
 
 @njit(cache=True, nogil=True)
 def _radiance(
-    heights: Any, out: Any, start: int, end: int, a: float, c: float, cell: float, across: float, seed: int, after: bool,
-    contrast: float, finest: float, count: int, sun: Any,
+    heights: Any, out: Any, a: float, c: float, cell: float, sun: Any,
+    across: float, seed: int, after: bool, contrast: float, finest: float, count: int,
 ) -> None:  # fmt: skip
-    rows, columns = heights.shape
+    """Fill ``out`` below the second row of ``heights``, whose first is at ``c``."""
     inv = 1.0 / cell
-    for i in range(start * FINE, end * FINE):
-        y = c + i * cell / FINE
-        for j in range(columns * FINE):
+    for i in range(out.shape[0]):
+        y = c + cell + i * cell / FINE
+        for j in range(out.shape[1]):
             x = a + j * cell / FINE
             zx = (_height(heights, a, c, inv, x + cell, y) - _height(heights, a, c, inv, x - cell, y)) * 0.5 * inv
             zy = (_height(heights, a, c, inv, x, y + cell) - _height(heights, a, c, inv, x, y - cell)) * 0.5 * inv
             facing = (sun[2] - zx * sun[0] - zy * sun[1]) / math.sqrt(1.0 + zx * zx + zy * zy)
             light = _SKY + (1.0 - _SKY) * max(facing, 0.0) / sun[2]
             value = light * reflectance_at(x, y, across, seed, after, contrast, finest, count)
-            out[i, j] = min(value / RADIANCE_UNIT, 65535.0)
+            out[i, j] = int(min(value / RADIANCE_UNIT, 65535.0))
 
 
 @njit(cache=True, nogil=True)
@@ -175,8 +184,9 @@ def _height(heights: Any, a: float, c: float, inv: float, x: float, y: float) ->
 
 @njit(cache=True, nogil=True)
 def _trace(
-    heights: Any, a: float, c: float, inv: float, x0: float, y0: float, z0: float, mx: float, my: float, top: float, steepest: float
-) -> float:
+    heights: Any, a: float, c: float, inv: float, x0: float, y0: float, z0: float, mx: float, my: float,
+    top: float, steepest: float,
+) -> float:  # fmt: skip
     """Return how far below (m) the ray (mx, my, -1) from (x0, y0, z0) meets the surface first.
 
     Sphere tracing: where the ray is ``gap`` above a surface no steeper than ``steepest``, it can not meet it within

@@ -11,7 +11,7 @@ from PIL import Image
 
 from ..block import View
 from ..report.html import Report, new_figure
-from .flight import expected_precision
+from .flight import Plan, expected_precision
 from .ground import Targets
 from .terrain import ZONES, Beach
 from .truth import Volumes
@@ -39,8 +39,7 @@ def write_report(
     beach: Beach,
     gsd: float,
     flights: dict[str, tuple[list[View], Targets, Path]],
-    base: float,
-    spacing: float,
+    plan: Plan,
     volumes: list[Volumes],
 ) -> None:
     """Write the page; ``flights`` maps a date to its views (beach coordinates), targets and photographs' folder."""
@@ -68,13 +67,14 @@ def write_report(
             ("photographs a date", len(views)),
             ("height above the beach (m)", float(np.mean([v.centre[2] for v in views]))),
             ("ground pixel (m)", gsd),
-            ("distance between photographs (m)", base),
-            ("distance between strips (m)", spacing),
+            ("distance between photographs (m)", plan.base),
+            ("distance between strips (m)", plan.spacing),
             ("views of a place, median", float(np.median(count))),
             ("expected sigma of heights, median (m)", median),
         ],
     )
-    report.figure(_plan(beach, views, flights[first][1], a, c, sigma), f"Plan of the flight of {first} over the expected precision.")
+    figure = _plan(beach, views, flights[first][1], a, c, sigma)
+    report.figure(figure, f"Plan of the flight of {first} over the precision to expect.")
     report.text(
         f"The precision is that of the normal case, sigma_Z = sigma x ground pixel x H / sqrt(sum of (b - mean b)^2) over the "
         f"places b of the views that see a place, with sigma = {EXPECTED_PIXELS} px for a point measured in all of them. It "

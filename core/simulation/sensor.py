@@ -10,7 +10,7 @@ READ_NOISE = 5.0  # electrons
 SAND_LEVEL = 0.34  # of full well, for dry flat sand under exposure 1
 _VIGNETTING = 0.12  # light lost in the corners
 # Colour of sand, paint and sea in red, green, blue.
-_TINTS = np.array([[1.06, 1.0, 0.84], [1.0, 1.0, 1.0], [0.50, 0.62, 0.62]], np.float32)
+_TINTS = np.array([[1.10, 1.0, 0.80], [1.0, 1.0, 1.0], [0.50, 0.62, 0.62]], np.float32)
 
 
 def electrons(light: NDArray[np.float32], exposure: float) -> NDArray[np.float32]:

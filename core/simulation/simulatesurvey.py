@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from ..errors import InputError
 from ..files import PART, digest, remove, whole, write_json
@@ -127,13 +127,13 @@ def _validate(r: Request) -> None:
             raise InputError(f"{name} is {value:g}, but must lie between {low} and {high}{unit and ' ' + unit}.")
     widest = max(r.camera_width, r.camera_height)
     if not 0.4 * widest <= r.focal <= 20 * widest:
-        raise InputError(f"FOCAL is {r.focal:g} px, but must lie between 0.4 and 20 times the photograph's longer side, {widest} px.")
+        raise InputError(f"FOCAL is {r.focal:g} px, but must lie between 0.4 and 20 times the longer side of {widest} px.")
     highest = 6.0 * _beach(r).relief  # the dune's crest and some air above it
     if not highest <= r.height <= 500:
         raise InputError(f"HEIGHT is {r.height:g} m, but must lie between {highest:.1f} m, to clear the dune, and 500 m.")
 
 
-def _standing(output: Path) -> dict[str, object] | None:
+def _standing(output: Path) -> dict[str, Any] | None:
     """Return what the simulation in ``output`` recorded, None when there is nothing.
 
     Raises
@@ -155,7 +155,7 @@ def _standing(output: Path) -> dict[str, object] | None:
     for path in sorted(output.rglob("*")):
         name = path.relative_to(output).as_posix()
         if path.is_file() and name not in known and not name.endswith(_SIDECARS):
-            raise InputError(f"The folder {output} holds {name}, which is not of the simulation: move it, or choose another OUTPUT.")
+            raise InputError(f"The folder {output} holds {name}, which is not of the simulation: choose another OUTPUT.")
     return dict(record)
 
 

@@ -125,7 +125,7 @@ def reflectance_at(
     """Return the reflectance relative to that of dry sand, with grains from ``finest`` (m) up in ``count`` octaves."""
     x = c / across
     now = seed + 700
-    if after and x > 8.5:
+    if after and x > 8.5 + 0.5 * noise(a / 0.9, c / 0.9, seed + 100):
         now = seed + 800  # sand moves between the dates
     texture = octaves(a, c, finest, count, now)
     waterline = 33.5 + 0.8 * noise(a / 6.0, 0.5, now + 101)
@@ -145,8 +145,6 @@ def grain_count(finest: float) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _fill_heights(
-    a: Array, c: Array, length: float, across: float, relief: float, seed: int, after: bool, out: Array
-) -> None:
+def _fill_heights(a: Array, c: Array, length: float, across: float, relief: float, seed: int, after: bool, out: Array) -> None:
     for i in range(a.size):
         out[i] = height_at(a[i], c[i], length, across, relief, seed, after)

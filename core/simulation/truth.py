@@ -56,15 +56,13 @@ def truth_grid(placement: Placement, beach: Beach) -> Grid:
     (west, south), (east, north) = corners.min(axis=0), corners.max(axis=0)
     cell = max(_CELL, _CELL * math.ceil(math.sqrt((east - west) * (north - south) / _MOST_CELLS) / _CELL))
     west, north = math.floor(west / cell) * cell, math.ceil(north / cell) * cell
-    return Grid(
-        west, north, cell, math.ceil((east - west) / cell), math.ceil((north - south) / cell), placement.frame.crs
-    )
+    return Grid(west, north, cell, math.ceil((east - west) / cell), math.ceil((north - south) / cell), placement.frame.crs)
 
 
 def surface_rows(placement: Placement, beach: Beach, grid: Grid, after: bool, start: int, end: int) -> Array:
     """Return the true heights (m; rows, columns) in the CRS at the centres of the cells in the rows ``start`` to ``end``."""
-    eastings = grid.west + (np.arange(grid.width) + 0.5) * grid.cell
-    northings = grid.north - (np.arange(start, end) + 0.5) * grid.cell
+    eastings = np.asarray(grid.west + (np.arange(grid.width) + 0.5) * grid.cell, float)
+    northings = np.asarray(grid.north - (np.arange(start, end) + 0.5) * grid.cell, float)
     a, c, lift = placement.on_grid(eastings, northings)
     return np.asarray(beach.heights(a, c, after) + lift)
 
