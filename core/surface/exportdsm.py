@@ -172,7 +172,7 @@ def _plan(survey: Survey, georef: Georef, request: Request, area: list[Any], scr
     resolution = request.resolution or 2.0 * gsd
     if resolution < 0.5 * gsd:
         progress.warn(
-            f"RESOLUTION {resolution:g} m is finer than half a ground pixel ({gsd:.3g} m): cells will repeat what few pixels show."
+            f"RESOLUTION {resolution:g} m is finer than half a ground pixel ({gsd:.3g} m): cells show no more than pixels do."
         )
     points = georef.frame.to_crs(block.points[block.errors <= np.percentile(block.errors, 95)])
     bounds = covered_bounds(block, georef.frame, points)
@@ -231,7 +231,7 @@ def _standing(survey: Survey, request: Request, fingerprint: str) -> Result | No
             return None
         Path(request.output_html_file).write_bytes(page.read_bytes())
     recorded = decode(Result, {k: v for k, v in record.result.items() if k != "bytes"})
-    unwanted = {name: None for name in (*_RASTERS, "points") if not getattr(request, name)}
+    unwanted: dict[str, Any] = {name: None for name in (*_RASTERS, "points") if not getattr(request, name)}
     return replace(recorded, **unwanted)
 
 

@@ -203,8 +203,8 @@ class _Thumbnails:
             thin = layer[first[0] :: s, first[1] :: s]
             self._numbers[name][r : r + thin.shape[0], c : c + thin.shape[1]] = thin
         for name, picture in (("shade", shade), ("colour", colour)):
-            thin = picture[first[0] :: s, first[1] :: s]
-            self._pictures[name][r : r + thin.shape[0], c : c + thin.shape[1]] = thin
+            part = picture[first[0] :: s, first[1] :: s]
+            self._pictures[name][r : r + part.shape[0], c : c + part.shape[1]] = part
 
     def layers(self) -> dict[str, Any]:
         return {**self._numbers, **self._pictures}

@@ -56,7 +56,8 @@ def match_tile(plan: Plan, tile: Tile) -> None:
     """Compute a tile and save it in the plan's scratch folder, unless it is there already.
 
     Layers: ``height`` (m above the plan's datum; the regularised surface everywhere), and on the finest level ``score``,
-    ``sigma`` (m), ``views`` (photographs that see the cell), ``covered`` (two photographs look there, hidden or not), ``good`` (what can be believed) and ``colour``.
+    ``sigma`` (m), ``views`` (photographs that see the cell), ``covered`` (it lies in two frames, hidden or not), ``good`` (what
+    can be believed) and ``colour``.
     """
     path = tile.path(plan.scratch)
     if path.is_file():

@@ -75,7 +75,7 @@ def tiles(level: Level, core: int = CORE, overlap: int = OVERLAP) -> list[Tile]:
     return out
 
 
-def save(path: Path, **layers: NDArray[Any]) -> None:
+def save(path: Path, **layers: Any) -> None:
     """Write a finished tile, whole or not at all."""
     with whole(path) as part, part.open("wb") as stream:
         np.savez(stream, **layers)

@@ -102,10 +102,7 @@ def paint(
             picture, 0.5**level, view.matrix, view.brown, view.fold2, west, north, cell, height,
             weight.astype(np.float32), colour, total,
         )  # fmt: skip
-        if picture.dtype == np.uint16:
-            bright = 255.0 / 65535.0
-        else:
-            bright = 1.0
+        bright = 255.0 / np.iinfo(picture.dtype).max
     out = np.zeros((rows, columns, 4), np.uint8)
     painted = total > 0
     out[..., :3][painted] = np.clip(np.rint(colour[painted] / total[painted, None] * bright), 0, 255) if painted.any() else 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,7 @@ class Plan:
         """The height (m) from which heights in tiles are counted, so that 32-bit numbers hold them to the micrometre."""
         return float(round(self.plane[0]))
 
-    def trend(self, easting: Array, northing: Array) -> Array:
+    def trend(self, easting: NDArray[Any], northing: NDArray[Any]) -> Array:
         """Return the height of the ground's plane above the datum."""
         a, b, c = self.plane
         return np.asarray(a - self.datum + b * (easting - self.grid.west) + c * (northing - self.grid.north))
