@@ -141,7 +141,8 @@ class Survey:
     @property
     def images(self) -> Path:
         """The folder with the photographs."""
-        return Path(os.path.normpath(self.folder / self._content.images))
+        # Resolved, because the relative path was made so: a link to the survey folder may lie anywhere.
+        return Path(os.path.normpath(self.folder.resolve() / self._content.images))
 
     @property
     def crs(self) -> str | None:

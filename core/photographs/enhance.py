@@ -62,14 +62,15 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             "IGNORE of 'enhance' is not available yet, because it needs to know where the photographs look: leave it empty here "
             "and give it to the later steps."
         )
+    Survey.open(request.survey)  # before a lock is put into a folder that is none
     with held(request.survey, "enhance"):
         survey = Survey.open(request.survey)
         standing = survey.require("createsurvey")
         photographs = [p for p in survey.photographs if p.decodable]
         _check(request, survey, photographs, progress)
-        folder = survey.folder / _FOLDER / _parameters_name(request.method, request.window)
+        folder = survey.folder.absolute() / _FOLDER / _parameters_name(request.method, request.window)
         key = [_VERSION, request.method, _window(request.method, request.window)]
-        paths = {p.name: survey.path(p) for p in photographs}
+        paths = {p.name: survey.path(p).absolute() for p in photographs}
         images = {p.name: _image_path(folder, p) for p in photographs}
         keys = {p.name: digest(p.digest, key) for p in photographs}
         contrasts = {p.name: c for p in photographs if (c := _standing(images[p.name], p, keys[p.name]))}
@@ -93,7 +94,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             parameters={"method": request.method, "window": request.window},
             result={"folder": f"{_FOLDER}/{folder.name}", "images": len(images)},
         )
-        _remove_strays(survey.folder / _FOLDER, set(images.values()))
+        _remove_strays(folder.parent, set(images.values()))
     progress.at(1.0)
     return Result(request.survey)
 

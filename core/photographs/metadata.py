@@ -6,6 +6,7 @@ import io
 import math
 import re
 import struct
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from ..survey import Position
 from .xmp import DJI, PIX4D_CAMERA, parse_xmp, xmp_number
 
 _DIAGONAL_35MM = math.hypot(36.0, 24.0)  # mm
+_SENSORS = 2.0, 100.0  # mm, the longer side
 _TIFF_HEADS = (b"II*\0", b"MM\0*")
 _PER_MM = {2: 1 / 25.4, 3: 0.1, 4: 1.0, 5: 1000.0}  # FocalPlaneResolutionUnit: inch, cm, mm, um
 _BROKEN = (OSError, SyntaxError, ValueError, TypeError, KeyError, IndexError, EOFError, ZeroDivisionError, struct.error)
@@ -25,15 +27,15 @@ class Metadata:
     """One photograph's metadata; what a file does not tell is None.
 
     ``body`` names maker, model, lens and serial number; ``focal_length`` and ``focal_length_35mm`` are in mm,
-    ``focal_plane`` is pixels per mm of the sensor at ``exif_width``. ``xmp_height`` is DJI's absolute altitude. ``problems``
-    says what could not be read.
+    ``focal_plane`` is pixels per mm of the sensor in a photograph whose longer side is ``exif_side``. ``xmp_height`` is
+    DJI's absolute altitude. ``problems`` says what could not be read.
     """
 
     body: str = ""
     focal_length: float | None = None
     focal_length_35mm: float | None = None
     focal_plane: float | None = None
-    exif_width: int | None = None
+    exif_side: int | None = None
     time: str | None = None
     position: Position | None = None
     exif_height: float | None = None
@@ -59,12 +61,15 @@ def read_metadata(data: bytes) -> Metadata:
     detail: dict[int, Any] = {}
     gps: dict[int, Any] = {}
     packet: Any = None
-    try:
-        exif, packet = _containers(data)
-        base, detail = dict(exif), dict(exif.get_ifd(ExifTags.IFD.Exif))
-        gps = dict(exif.get_ifd(ExifTags.IFD.GPSInfo))
-    except _BROKEN as error:
-        problems.append(f"EXIF ({error})")
+    with warnings.catch_warnings(record=True) as complaints:
+        warnings.simplefilter("always")
+        try:
+            exif, packet = _containers(data)
+            base, detail = dict(exif), dict(exif.get_ifd(ExifTags.IFD.Exif))
+            gps = dict(exif.get_ifd(ExifTags.IFD.GPSInfo))
+        except _BROKEN as error:
+            problems.append(f"EXIF is broken ({error})")
+    problems += [f"EXIF is broken ({str(c.message).strip()})" for c in complaints if issubclass(c.category, UserWarning)][:1]
     properties: dict[tuple[str, str], str] = {}
     if packet:
         try:
@@ -74,13 +79,13 @@ def read_metadata(data: bytes) -> Metadata:
     exif_height = _height(gps)
     focal_plane = _number(detail.get(ExifTags.Base.FocalPlaneXResolution))
     unit = _number(detail.get(ExifTags.Base.FocalPlaneResolutionUnit)) or 2
-    width = _number(detail.get(ExifTags.Base.ExifImageWidth))
+    sides = [_number(detail.get(t)) or 0.0 for t in (ExifTags.Base.ExifImageWidth, ExifTags.Base.ExifImageHeight)]
     return Metadata(
         body=_body(base, detail),
         focal_length=_positive(detail.get(ExifTags.Base.FocalLength)),
         focal_length_35mm=_positive(detail.get(ExifTags.Base.FocalLengthIn35mmFilm)),
         focal_plane=focal_plane * _PER_MM[int(unit)] if focal_plane and unit in _PER_MM else None,
-        exif_width=int(width) if width else None,
+        exif_side=int(max(sides)) or None,
         time=_time(detail),
         position=_position(gps, exif_height, properties),
         exif_height=exif_height,
@@ -99,20 +104,18 @@ def focal_pixels(metadata: Metadata, width: int, height: int) -> float | None:
     The sensor's pixel pitch (``FocalPlaneXResolution``) is exact where it is given. The "35 mm equivalent" is rounded to
     a millimetre and refers to the diagonal of the sensor (CIPA DCG-001), ``hypot(36, 24)`` mm. A picture wider than
     3:2 is cut from a higher sensor, taken to be 4:3 as in most drones; on a 3:2 sensor that is 4 % too long. Where both are given
-    and differ by a quarter, the pitch is of something else (some phones) and the equivalent is used.
+    and differ by a quarter, or the sensor would be 2 mm or 100 mm wide, the pitch is of something else and is not used.
     """
+    long, short = max(width, height), min(width, height)
     equivalent = None
     if metadata.focal_length_35mm:
-        long, short = max(width, height), min(width, height)
         diagonal = math.hypot(long, 0.75 * long if long > 1.52 * short else short)
         equivalent = metadata.focal_length_35mm * diagonal / _DIAGONAL_35MM
     if metadata.focal_plane and metadata.focal_length:
-        # A photograph made smaller keeps the pitch of the original.
-        scale = width / metadata.exif_width if metadata.exif_width else 1.0
-        if metadata.exif_width and width < height and metadata.exif_width > width:
-            scale = height / metadata.exif_width  # turned to upright after the exposure
-        pixels = metadata.focal_length * metadata.focal_plane * scale
-        if equivalent is None or 0.8 < pixels / equivalent < 1.25:
+        side = metadata.exif_side or long  # a photograph made smaller keeps the pitch of the original
+        pixels = metadata.focal_length * metadata.focal_plane * long / side
+        sensor = side / metadata.focal_plane
+        if _SENSORS[0] < sensor < _SENSORS[1] and (equivalent is None or 0.8 < pixels / equivalent < 1.25):
             return pixels
     return equivalent
 

@@ -1,0 +1,127 @@
+"""Files that are whole or absent, and fingerprints."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from strandline.core import files
+
+
+def test_a_file_replaces_and_keeps_its_suffix(tmp_path):
+    target = tmp_path / "deep" / "a.txt"
+    for text in ("one", "two"):
+        with files.whole(target) as part:
+            assert part.suffix == ".txt"
+            part.write_text(text)
+    assert target.read_text() == "two"
+    assert [p.name for p in target.parent.iterdir()] == ["a.txt"]
+
+
+def test_what_stood_stays_when_the_body_fails(tmp_path):
+    target = tmp_path / "a.txt"
+    target.write_text("before")
+
+    def write():
+        with files.whole(target) as part:
+            part.write_text("half")
+            raise ZeroDivisionError
+
+    pytest.raises(ZeroDivisionError, write)
+    assert target.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_folder_replaces_a_folder(tmp_path):
+    target = tmp_path / "model"
+    for names in (("old",), ("new", "newer")):
+        with files.whole(target) as part:
+            part.mkdir()
+            for name in names:
+                (part / name).write_text(name)
+    assert sorted(p.name for p in target.iterdir()) == ["new", "newer"]
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_kill_leaves_what_stood(tmp_path):
+    target = tmp_path / "a.txt"
+    target.write_text("before")
+    program = (
+        "import sys, time\nfrom strandline.core.files import whole\n"
+        f"with whole({str(target)!r}) as part:\n    part.write_text('half'); print('ready', flush=True); time.sleep(60)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        os.kill(process.pid, signal.SIGKILL)
+    assert target.read_text() == "before"
+    assert len(list(tmp_path.iterdir())) == 2
+    files.remove_parts(tmp_path)
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_folder_caught_between_two_renames_is_put_back(tmp_path, monkeypatch):
+    target = tmp_path / "model"
+    target.mkdir()
+    (target / "old").touch()
+
+    def killed(path):
+        raise SystemExit  # stands for a kill: nothing is cleaned up
+
+    real, calls = type(target).rename, []
+
+    def rename(self, to):
+        calls.append(self)
+        return killed(self) if len(calls) == 2 else real(self, to)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(type(target), "rename", rename)
+        patch.setattr(files, "remove", lambda path: None)
+        with pytest.raises(SystemExit), files.whole(target) as part:
+            part.mkdir()
+    assert not target.exists()
+    files.remove_parts(tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["model"]
+    assert [p.name for p in target.iterdir()] == ["old"]
+
+
+def test_a_part_of_a_file_called_old_is_only_removed(tmp_path):
+    (tmp_path / f"{files.PART}12-beach-old-dsm.tif").touch()
+    (tmp_path / f"{files.PART}12-old-dsm.tif").touch()
+    files.remove_parts(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_digests_are_of_content(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"sand")
+    assert files.file_digest(path) == files.bytes_digest(b"sand")
+    assert len(files.digest({"b": 1, "a": (1, 2)})) == 32
+    assert files.digest({"b": 1, "a": (1, 2)}) == files.digest({"a": [1, 2], "b": 1})
+    assert files.digest("a", "b") != files.digest("ab")
+    assert files.digest(1) != files.digest("1")
+
+
+def test_json_has_no_nan(tmp_path):
+    files.write_json(tmp_path / "a.json", {"x": float("nan"), "y": [1.5, None]})
+    assert json.loads((tmp_path / "a.json").read_text()) == {"x": None, "y": [1.5, None]}
+
+
+def test_a_file_that_appears_is_complete(tmp_path):
+    # A reader polling while a writer replaces 2 MB again and again never sees a short one.
+    target = tmp_path / "a.bin"
+    program = (
+        "from strandline.core.files import whole\n"
+        f"for k in range(30):\n    with whole({str(target)!r}) as part: part.write_bytes(bytes([k]) * 2_000_000)\n"
+    )
+    sizes = set()
+    with subprocess.Popen([sys.executable, "-c", program]) as process:
+        while process.poll() is None:
+            if target.exists():
+                sizes.add(len(target.read_bytes()))
+            time.sleep(0.001)
+    assert process.returncode == 0
+    assert sizes <= {2_000_000}
+    assert len(target.read_bytes()) == 2_000_000
