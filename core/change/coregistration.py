@@ -105,7 +105,7 @@ def fit_shift(method: Method, x: Array, y: Array, change: Array) -> Shift:
     coefficients: Array = np.zeros(3)
     for _ in range(50):
         root = np.sqrt(weights)
-        new = np.linalg.lstsq(design * root[:, None], change * root, rcond=None)[0]
+        new = np.asarray(np.linalg.lstsq(design * root[:, None], change * root, rcond=None)[0], np.float64)
         residual = change - design @ new
         scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-12)
         weights = np.asarray(np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(residual), 1e-300)), np.float64)

@@ -192,7 +192,7 @@ def _hillshade(height: Array, step: float) -> Array:
 
 def _limit(change: Array) -> float:
     sizes = np.abs(change[np.isfinite(change)])
-    limit = float(np.quantile(sizes, 0.98)) if len(sizes) else 0.0
+    limit = float(np.quantile(sizes, 0.95)) if len(sizes) else 0.0
     return limit if limit > 0 else 1.0
 
 

@@ -60,32 +60,41 @@ def fit_variogram(
     if extent < 8 * shortest:
         return None
     wanted = np.unique(np.round(np.geomspace(1.0, extent / 2 / shortest, _LAGS), 2)) * shortest
-    lags, gamma, weight = _empirical(row, column, values, steps, wanted)
+    lags, gamma, pairs = _empirical(row, column, values, steps, wanted)
     if len(lags) < 5:
         return None
-    best: tuple[float, float, float, float] | None = None
-    candidates = np.geomspace(1.5 * shortest, lags[-1], 60)
-    for reach in candidates:
+    reaches = np.geomspace(1.5 * shortest, lags[-1], 60)
+    nugget, sill, reach = _spherical(lags, gamma, np.sqrt(pairs), reaches)
+    for _ in range(3):
+        # The scatter of an empirical value goes with the true one, which is the model's, not its own.
+        expected = nugget + sill * (1.0 - correlation(lags, reach))
+        nugget, sill, reach = _spherical(
+            lags, gamma, np.sqrt(pairs) / np.maximum(expected, 1e-9 * max(gamma.max(), 1e-30)), reaches
+        )
+    unresolved = sill > 0 and reach >= reaches[-2]
+    return Variogram(nugget, sill, np.inf if unresolved else reach, tuple(lags.tolist()), tuple(gamma.tolist()))
+
+
+def _spherical(lags: Array, gamma: Array, weight: Array, reaches: Array) -> tuple[float, float, float]:
+    """Return nugget, sill and range of the weighted least squares over ``reaches``."""
+    fits = []
+    for reach in reaches:
         model = np.column_stack([np.ones(len(lags)), 1.0 - correlation(lags, float(reach))])
         (nugget, sill), misfit = nnls(model * weight[:, None], gamma * weight)
-        if best is None or misfit < best[0]:
-            best = (misfit, nugget, sill, float(reach))
-    assert best is not None
-    _, nugget, sill, reach = best
-    unresolved = sill > 0 and reach >= candidates[-2]
-    return Variogram(float(nugget), float(sill), np.inf if unresolved else reach, tuple(lags.tolist()), tuple(gamma.tolist()))
+        fits.append((float(misfit), float(nugget), float(sill), float(reach)))
+    return min(fits)[1:]
 
 
 def _empirical(
     row: NDArray[np.int64], column: NDArray[np.int64], values: Array, steps: tuple[float, float], wanted: Array
 ) -> tuple[Array, Array, Array]:
-    """Return true mean lags, half variograms and relative weights (m,) of the lags that have pairs."""
+    """Return true mean lags, half variograms and numbers of different pairs (m,) of the lags that have enough."""
     random = np.random.default_rng(_SEED)
     width = int(column.max()) + 1
     order = np.argsort(row * width + column)
     row, column, values = row[order], column[order], values[order]
     keys = row * width + column
-    lags, gamma, weight = [], [], []
+    lags, gamma, pairs = [], [], []
     for lag in wanted:
         first = random.integers(0, len(keys), _PAIRS)
         angle = random.uniform(0, 2 * np.pi, _PAIRS)
@@ -95,14 +104,14 @@ def _empirical(
         key = r * width + c
         place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
         found = inside & (keys[place] == key) & (place != first)
-        if np.count_nonzero(found) < _LEAST_PAIRS:
+        together = np.unique(np.minimum(first, place)[found] * len(keys) + np.maximum(first, place)[found])
+        if len(together) < _LEAST_PAIRS:
             continue
-        a, b = first[found], place[found]
+        a, b = together // len(keys), together % len(keys)
         lags.append(float(np.mean(np.hypot((row[a] - row[b]) * steps[0], (column[a] - column[b]) * steps[1]))))
         gamma.append(0.5 * 2.198 * float(np.median(np.abs(values[a] - values[b]))) ** 2)
-        weight.append(np.sqrt(len(a)))
-    level = np.maximum(np.asarray(gamma), 1e-30)
-    return np.asarray(lags), np.asarray(gamma), np.asarray(weight) / level if len(lags) else np.asarray(weight)
+        pairs.append(float(len(together)))
+    return np.asarray(lags), np.asarray(gamma), np.asarray(pairs)
 
 
 @njit(cache=True)  # pragma: no cover
