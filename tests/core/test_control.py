@@ -1,0 +1,179 @@
+"""Ground control from layers and tables, as users keep them."""
+
+import numpy as np
+import pytest
+import shapely
+from pyproj import Transformer
+from strandline.core.contract import VectorSource
+from strandline.core.errors import InputError
+from strandline.core.orientation.control import Given, Mark, control_from, given_from_layers, in_metres, match_photograph
+from strandline.core.survey import Photograph
+from strandline.core.vector import write_layer
+
+UTM = "EPSG:32631"
+PHOTOS = [Photograph(n, 1, "x", 4000, 3000, "c") for n in ("DJI_0001.JPG", "DJI_0002.JPG", "east/IMG_1.CR2", "west/IMG_1.CR2")]
+PLACES = np.array([[500000.0, 4983000.0, 3.0], [500050.0, 4983010.0, 4.0], [500020.0, 4983060.0, 2.0]])
+
+
+def given(**changes):
+    values = {"where": "gcps", "crs": UTM, "names": ("A", "B", "C"), "coordinates": PLACES}
+    return Given(**{**values, **changes})
+
+
+def control(**changes):
+    options = {k: changes.pop(k) for k in ("check", "sigma_h") if k in changes}
+    return control_from(given(**changes), UTM, PHOTOS, **{"sigma_h": 0.01, "sigma_v": 0.02, **options})
+
+
+def layer(path, fields, shapes, crs=UTM, kind="Point Z"):
+    write_layer(str(path), "gcps", crs, fields, shapes, kind)
+    return VectorSource(str(path), "gcps")
+
+
+def test_layer_and_table(tmp_path):
+    fields = {"Name": ["A", "B"], "H": ["3.5", None], "Use": ["Check", None], "SH": [0.5, None]}
+    points = layer(tmp_path / "g.gpkg", fields, list(shapely.points(PLACES[:2])))
+    table = tmp_path / "marks.csv"
+    table.write_text('IMAGE,Gcp,Y,x\ndji_0001,a,"20","10.25"\n', encoding="utf-8")
+    marks = VectorSource(str(table), "marks")
+    read = given_from_layers(
+        points, marks, name_field="name", height_field=None, role_field="use", sigma_h_field="sh", sigma_v_field=None
+    )
+    assert read.coordinates == pytest.approx(PLACES[:2])
+    found = control_from(read, UTM, PHOTOS, sigma_h=0.01, sigma_v=0.02)
+    assert [(p.name, p.check, p.sigma_h, p.sigma_v) for p in found.points] == [("A", True, 0.5, 0.02), ("B", False, 0.01, 0.02)]
+    assert found.points[0].marks == (Mark("a", "DJI_0001.JPG", 10.25, 20.0),)  # pixels from the corner: as they are
+    with pytest.raises(InputError, match="B of gcps has no complete coordinates"):
+        control_from(
+            given_from_layers(points, None, name_field="Name", height_field="H"), UTM, PHOTOS, sigma_h=0.01, sigma_v=0.02
+        )
+
+
+def test_multipoints_of_one_point_are_points(tmp_path):
+    points = layer(tmp_path / "g.gpkg", {"n": [1]}, [shapely.MultiPoint([PLACES[0]])], kind="MultiPoint Z")
+    read = given_from_layers(points, None, name_field="n", height_field=None)
+    assert read.names == ("1",)
+    assert read.coordinates == pytest.approx(PLACES[:1])
+
+
+@pytest.mark.parametrize(
+    ("shapes", "kind", "fields", "why"),
+    [
+        ([], "Point Z", {"n": []}, "is empty"),
+        ([shapely.Point(1, 2)], "Point", {"n": ["A"]}, "no heights"),
+        ([shapely.Point(1, 2, 3)], "Point Z", {"n": [None]}, "has no name"),
+        ([shapely.LineString([(1, 2, 3), (2, 3, 4)])], "LineString Z", {"n": ["A"]}, "not one point"),
+        ([None], "Point Z", {"n": ["A"]}, "not one point"),
+    ],
+)
+def test_layers_that_are_no_control(tmp_path, shapes, kind, fields, why):
+    with pytest.raises(InputError, match=why):
+        given_from_layers(layer(tmp_path / "g.gpkg", fields, shapes, kind=kind), None, name_field="n", height_field=None)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("gcp,image,x,y\n", "is empty"),
+        ("gcp,image,x\nA,a,1\n", "no field 'y'"),
+        ("gcp,image,x,y\nA,a,1,\n", "row 1"),
+        ("gcp,image,x,y\nA,a,1,2\n,a,1,2\n", "row 2"),
+        ("gcp,image,x,y\nA,a,1,two\n", "'two' in the field y"),
+    ],
+)
+def test_tables_that_are_no_marks(tmp_path, text, why):
+    points = layer(tmp_path / "g.gpkg", {"n": ["A"]}, [shapely.Point(*PLACES[0])])
+    table = tmp_path / "marks.csv"
+    table.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=why):
+        given_from_layers(points, VectorSource(str(table), "marks"), name_field="n", height_field=None)
+
+
+@pytest.mark.parametrize(
+    ("image", "name"),
+    [
+        ("DJI_0001.JPG", "DJI_0001.JPG"),
+        ("dji_0001.jpg", "DJI_0001.JPG"),
+        ("  DJI_0001 ", "DJI_0001.JPG"),
+        ("DJI_0001.tif", "DJI_0001.JPG"),
+        (r"D:\flight\DJI_0002.JPG", "DJI_0002.JPG"),
+        ("east/IMG_1", "east/IMG_1.CR2"),
+        ("flight/WEST/img_1.jpg", "west/IMG_1.CR2"),
+        ("DJI_0003.JPG", None),
+    ],
+)
+def test_images_match_forgivingly(image, name):
+    assert match_photograph(image, PHOTOS) == name
+
+
+def test_an_image_that_could_be_two_is_refused():
+    with pytest.raises(InputError, match=r"east/IMG_1\.CR2 or west/IMG_1\.CR2"):
+        match_photograph("IMG_1.CR2", PHOTOS)
+
+
+def test_what_does_not_match_is_listed():
+    found = control(marks=(Mark(" a ", "DJI_0001", 1, 2), Mark("D", "DJI_0001", 5, 6), Mark("A", "IMG_9.JPG", 3, 4)))
+    assert [len(p.marks) for p in found.points] == [1, 0, 0]
+    assert any("not in the survey were left out: IMG_9.JPG" in n for n in found.notes)
+    assert any("not among the GCPs were left out: D" in n for n in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"names": ("A", "B", " a")}, "share a name"),
+        ({"crs": None}, "no CRS"),
+        ({"crs": "EPSG:999999"}, "not understood"),
+        ({"roles": ("control", "spare", "")}, "role 'spare'"),
+        ({"check": "B, Z"}, "'Z' of CHECK"),
+        ({"sigmas": np.array([[0.01, 0.02], [0.0, 0.1], [0.1, 0.1]])}, "sigma of B"),
+        ({"marks": (Mark("A", "DJI_0001", 4000.5, 20.0),)}, "outside the photograph of 4000 x 3000"),
+        ({"marks": (Mark("A", "DJI_0001", -0.5, 20.0),)}, "outside the photograph"),
+        ({"marks": (Mark("A", "DJI_0001", 1, 2), Mark("A", "dji_0001.jpg", 9, 2))}, "marked twice"),
+        ({"marks": (Mark("A", "other.jpg", 1, 2),)}, "No mark of gcps matches"),
+        ({"coordinates": PLACES * [1, 1, np.nan]}, "no complete coordinates"),
+        ({"coordinates": np.array([[3.0, 45.0, 1.0], [3.001, 45.0, 1.0], [3.0, 45.001, 1.0]])}, "look like degrees"),
+        ({"crs": "EPSG:4326"}, "are no degrees"),
+        ({"crs": "EPSG:2263"}, "does not declare the unit of its heights"),
+    ],
+)
+def test_unsound_control_is_one_sentence(changes, why):
+    with pytest.raises(InputError, match=why) as told:
+        control(**changes)
+    assert str(told.value).count(". ") == 0
+
+
+def test_check_points_by_name_and_identical_marks():
+    twice = (Mark("A", "DJI_0001", 1, 2), Mark("A", "dji_0001.jpg", 1, 2))
+    found = control(check="b, C", roles=("check", "", "control"), marks=twice)
+    assert [p.check for p in found.points] == [True, True, True]
+    assert len(found.points[0].marks) == 1
+
+
+def test_zero_heights_are_called_out():
+    one = PLACES.copy()
+    one[1, 2] = 0.0
+    assert "B of gcps has height 0 unlike the others" in " ".join(control(coordinates=one).notes)
+    assert "All heights of gcps are 0" in " ".join(control(coordinates=PLACES * [1, 1, 0]).notes)
+    assert control().notes == ()
+
+
+def test_two_targets_marked_at_one_place():
+    found = control(marks=(Mark("A", "DJI_0001", 10, 20), Mark("B", "DJI_0001", 11, 20), Mark("C", "DJI_0001", 15, 20)))
+    assert [n for n in found.notes if "same place" in n] == [
+        "A and B are marked at the same place in DJI_0001.JPG: one of the two is wrong."
+    ]
+
+
+def test_declared_feet_become_metres_in_plan_and_height():
+    # New York Long Island in US survey feet with NAVD 88 heights in the same; the same points in metres of the same grid.
+    feet = np.array([[984250.0, 196850.0, 100.0], [984350.0, 196850.0, 0.0], [984250.0, 196950.0, 50.0]])
+    moved = in_metres(given(crs="EPSG:2263+6360", coordinates=feet), "EPSG:32118")
+    assert moved == pytest.approx(feet * 1200 / 3937, abs=1e-4)
+
+
+def test_degrees_with_heights_in_metres_are_moved():
+    to_degrees = Transformer.from_crs(UTM, "EPSG:4326", always_xy=True)
+    degrees = np.column_stack([*to_degrees.transform(PLACES[:, 0], PLACES[:, 1]), PLACES[:, 2]])
+    assert in_metres(given(crs="EPSG:4326", coordinates=degrees), UTM) == pytest.approx(PLACES, abs=1e-4)
+    assert in_metres(given(crs="EPSG:4979", coordinates=degrees), UTM) == pytest.approx(PLACES, abs=1e-4)
