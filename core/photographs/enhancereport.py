@@ -76,7 +76,7 @@ def _show(report: Report, survey: Survey, photograph: Photograph, image: Path) -
     report.picture(_pair(_crop(before), _crop(after)), f"Before and after, {_CROP} pixels from the middle.")
     figure = new_figure(8.0, 2.6)
     for axes, pixels, title in zip(figure.subplots(1, 2), (before, after), ("before", "after"), strict=True):
-        axes.hist(pixels[::8, ::8].ravel(), bins=np.arange(257), color="#2a6f97")
+        axes.stairs(np.bincount(pixels[::4, ::4].ravel(), minlength=256), np.arange(257), fill=True, color="#2a6f97")
         axes.set_title(f"{title}: mean {pixels.mean():.0f}, standard deviation {pixels.std():.0f}", fontsize=9)
         axes.set_xlim(0, 256)
         axes.set_yticks([])

@@ -9,7 +9,7 @@ import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -26,6 +26,7 @@ TIFF = frozenset({".tif", ".tiff"})
 PNG = frozenset({".png"})
 _RAW = "3fr arw cr2 cr3 crw dng erf fff iiq kdc mos mrw nef nrw orf pef raf raw rw2 rwl sr2 srw x3f"
 RAW = frozenset(f".{kind}" for kind in _RAW.split())
+_ORIENTATION = 274  # TIFF tag
 DECODABLE = JPG | TIFF | PNG
 
 # In entropy-coded data 0xFF is followed by 0x00, by a restart marker, or by more 0xFF; anything else is a marker.
@@ -77,8 +78,8 @@ def decode_pixels(data: bytes) -> NDArray[Any]:
     if not data:
         raise ValueError("empty")
     try:
-        # "Unchanged" keeps the depth and the stored orientation.
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        # "Unchanged" keeps the depth and, but for TIFF, the stored orientation.
+        pixels = cv2.imdecode(np.frombuffer(_upright(data), np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
         raise ValueError("truncated or not an image") from error
     if pixels is None:
@@ -143,6 +144,18 @@ def frame_size(data: bytes) -> tuple[int, int]:
     except (OSError, SyntaxError, ValueError) as error:
         raise ValueError(f"not decodable, {error}") from error
     return size
+
+
+def _upright(data: bytes) -> bytes:
+    """Return a TIFF with its orientation tag set to 1, so that decoding does not turn it; other files as they are."""
+    if not data.startswith((b"II*\0", b"MM\0*")):
+        return data
+    order: Literal["little", "big"] = "little" if data.startswith(b"II") else "big"
+    first = int.from_bytes(data[4:8], order)
+    for entry in range(first + 2, first + 2 + 12 * int.from_bytes(data[first : first + 2], order), 12):
+        if int.from_bytes(data[entry : entry + 2], order) == _ORIENTATION:
+            return data[: entry + 8] + (1).to_bytes(2, order) + data[entry + 10 :]
+    return data
 
 
 def _reaches_end_of_image(data: bytes) -> bool:

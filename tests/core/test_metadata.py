@@ -15,6 +15,7 @@ EXIF, GPS = 0x8769, 0x8825
 
 def photograph(base=None, detail=None, gps=None, xmp=None, kind="JPEG"):
     exif = Image.Exif()
+    exif[0x0131] = "test"  # Pillow writes no EXIF without a tag in its first directory
     for tag, value in (base or {}).items():
         exif[tag] = value
     exif.get_ifd(EXIF).update(detail or {})
@@ -28,7 +29,8 @@ def photograph(base=None, detail=None, gps=None, xmp=None, kind="JPEG"):
         exif[700] = xmp
     elif xmp:
         more["xmp"] = xmp
-    Image.fromarray(np.zeros((8, 12, 3), np.uint8)).save(stream, kind, exif=exif, **more)
+    # The TIFF writer sees the directories of EXIF and GNSS only in bytes.
+    Image.fromarray(np.zeros((8, 12, 3), np.uint8)).save(stream, kind, exif=exif.tobytes() if kind == "TIFF" else exif, **more)
     return stream.getvalue()
 
 
