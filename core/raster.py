@@ -25,6 +25,9 @@ from rasterio.windows import Window
 from .errors import InputError
 from .files import whole
 
+# GDAL would keep 5 % of the machine's memory in blocks, in each process.
+os.environ.setdefault("GDAL_CACHEMAX", "192")
+
 NODATA = -9999.0
 _BLOCK = 512
 

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 _STEP = 32  # cells between exactly transformed points; between them a map projection is straight to micrometres
 _SAME = 1.2  # up to this ratio of cell sizes one point a cell tells all
 _READ = 8_000_000  # cells of a model read at once: 64 MB
+_SNAP = 1e-5  # cells
 _AXIS = 1e-9  # rotation (per cell) below which a raster counts as north-up
 
 
@@ -168,39 +169,47 @@ def _lattice(count: int) -> Array:
 @njit(cache=True)  # pragma: no cover
 def _sample(values: Array, lattice: Array, step: int, points: int, out: Array) -> None:
     """Fill ``out`` with means of bilinear samples; ``lattice`` holds column, row (corners) in ``values`` every ``step`` cells."""
-    height, width = values.shape
     rows, columns = out.shape
+    nodes = lattice.shape[1]
+    along = np.empty((points, nodes, 2))  # the lattice on the lines of samples of one row of cells
     for r in range(rows):
+        for i in range(points):
+            v = (r + (i + 0.5) / points) / step
+            v0 = min(int(v), lattice.shape[0] - 2)
+            for k in range(nodes):
+                for a in range(2):
+                    along[i, k, a] = (1 - v + v0) * lattice[v0, k, a] + (v - v0) * lattice[v0 + 1, k, a] - 0.5
         for c in range(columns):
             total, count = 0.0, 0
-            for i in range(points):
-                v = (r + (i + 0.5) / points) / step
-                v0 = min(int(v), lattice.shape[0] - 2)
-                fv = v - v0
-                for j in range(points):
-                    u = (c + (j + 0.5) / points) / step
-                    u0 = min(int(u), lattice.shape[1] - 2)
-                    fu = u - u0
-                    w00, w01, w10, w11 = (1 - fv) * (1 - fu), (1 - fv) * fu, fv * (1 - fu), fv * fu
-                    x = w00 * lattice[v0, u0, 0] + w01 * lattice[v0, u0 + 1, 0]
-                    x += w10 * lattice[v0 + 1, u0, 0] + w11 * lattice[v0 + 1, u0 + 1, 0] - 0.5
-                    y = w00 * lattice[v0, u0, 1] + w01 * lattice[v0, u0 + 1, 1]
-                    y += w10 * lattice[v0 + 1, u0, 1] + w11 * lattice[v0 + 1, u0 + 1, 1] - 0.5
-                    # Centres that meet but for rounding need one neighbour, not four.
-                    if abs(x - round(x)) < 1e-5:
-                        x = float(round(x))
-                    if abs(y - round(y)) < 1e-5:
-                        y = float(round(y))
-                    if not (0.0 <= x <= width - 1 and 0.0 <= y <= height - 1):
-                        continue
-                    x0, y0 = int(x), int(y)
-                    fx, fy = x - x0, y - y0
-                    x1, y1 = x0 + (1 if fx > 0 else 0), y0 + (1 if fy > 0 else 0)
-                    upper = (1 - fx) * values[y0, x0] + fx * values[y0, x1]
-                    lower = (1 - fx) * values[y1, x0] + fx * values[y1, x1]
-                    sample = (1 - fy) * upper + fy * lower
+            u0 = c // step
+            for j in range(points):
+                u = (c - u0 * step + (j + 0.5) / points) / step
+                for i in range(points):
+                    x = along[i, u0, 0] + u * (along[i, u0 + 1, 0] - along[i, u0, 0])
+                    y = along[i, u0, 1] + u * (along[i, u0 + 1, 1] - along[i, u0, 1])
+                    sample = _bilinear(values, x, y)
                     if not np.isnan(sample):
                         total += sample
                         count += 1
             if 2 * count >= points * points:
                 out[r, c] = total / count
+
+
+@njit(cache=True, inline="always")  # pragma: no cover
+def _bilinear(values: Array, x: float, y: float) -> float:
+    """Return the value between four cells at ``x``, ``y`` (centres at whole numbers); NaN beyond the outer centres."""
+    x0, y0 = int(np.floor(x + _SNAP)), int(np.floor(y + _SNAP))
+    if x0 < 0 or y0 < 0 or x0 >= values.shape[1] or y0 >= values.shape[0]:
+        return np.nan
+    fx, fy = x - x0, y - y0
+    # Centres that meet but for rounding need one neighbour, not four.
+    x1, y1 = x0 + (1 if fx > _SNAP else 0), y0 + (1 if fy > _SNAP else 0)
+    if x1 >= values.shape[1] or y1 >= values.shape[0]:
+        return np.nan
+    if x1 == x0:
+        fx = 0.0
+    if y1 == y0:
+        fy = 0.0
+    upper = (1 - fx) * values[y0, x0] + fx * values[y0, x1]
+    lower = (1 - fx) * values[y1, x0] + fx * values[y1, x1]
+    return (1 - fy) * upper + fy * lower

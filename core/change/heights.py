@@ -16,7 +16,7 @@ from ..raster import RasterFile
 from .units import Units, units_of
 
 Array = NDArray[np.float64]
-_CELLS = 4_000_000  # cells read at once: 32 MB
+_CELLS = 2_000_000  # cells read at once: 16 MB
 _CUSTOMARY = frozenset({-99.0, -999.0, -9999.0, -10000.0, -32767.0, -32768.0, -99999.0, 9999.0, 32767.0, 65535.0, 99999.0})
 _NO_HEIGHT = 1e5  # metres; nothing on Earth is that high or deep
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from ..raster import Grid
-from .sampling import Sample
+from .sampling import Sample, mixed
 from .uncertainty import SAMPLE, ErrorModel, Systematic, correlated_variance, total
 
 Array = NDArray[np.float64]
@@ -73,14 +74,6 @@ class _Sum:
         self.height, self.weight, self.squares = 0.0, 0.0, 0.0
         self.sample = Sample(SAMPLE, 3)
 
-    def add(self, cells: NDArray[np.int64], x: Array, y: Array, share: Array, change: Array, sigma: Array | None) -> None:
-        self.height += float(share @ change)
-        self.weight += float(share.sum())
-        if sigma is not None:
-            part = share * sigma
-            self.squares += float(part @ part)
-            self.sample.add(cells, x, y, part)
-
     def parts(self, cell_area: float, known: bool, model: ErrorModel, shift_sigma: float | None) -> Parts:
         """Return the three sigmas of this sum."""
         random = correlated = None
@@ -109,31 +102,34 @@ class Tally:
 
     def add(self, tile: Cells, row: int, column: int, shares: Array) -> None:
         """Add the cells of a tile from ``row``, ``column`` on that lie inside by ``shares`` (rows, columns)."""
-        rows, columns = np.nonzero((shares > 0) & np.isfinite(tile.change[row:, column:][: shares.shape[0], : shares.shape[1]]))
-        if not len(rows):
-            return
-        share = shares[rows, columns]
-        rows, columns = rows + row, columns + column
+        part = (slice(row, row + shares.shape[0]), slice(column, column + shares.shape[1]))
         grid = tile.grid
         self._cell_area = grid.cell_area
-        change = tile.change[rows, columns]
-        sigma = None if tile.sigma is None else tile.sigma[rows, columns]
-        if sigma is None or not np.isfinite(sigma).all():
-            sigma, self._sigma_known = None, False
-        x, y = grid.centres(rows, columns)
-        cells = tile.first + rows * tile.stride + columns
-        self._net.add(cells, x, y, share, change, sigma)
-        for some, chosen in ((self._down, change < 0), (self._up, change > 0)):
-            some.add(cells[chosen], x[chosen], y[chosen], share[chosen], change[chosen], None if sigma is None else sigma[chosen])
-        self._place += (share @ x, share @ y, share @ tile.before[rows, columns])
-        if tile.significant is None:
-            self._detected = False
-            return
-        kept = tile.significant[rows, columns]
-        self._significant_down += float(share[kept] @ np.maximum(-change[kept], 0.0))
-        self._significant_up += float(share[kept] @ np.maximum(change[kept], 0.0))
-        if sigma is not None:
-            self._noise += _HALF_NORMAL * float(share[~kept] @ sigma[~kept])
+        change, before = tile.change[part], tile.before[part]
+        sigma = np.full_like(change, np.nan) if tile.sigma is None else tile.sigma[part]
+        kept = np.zeros(change.shape, np.bool_) if tile.significant is None else tile.significant[part]
+        groups = (self._net, self._down, self._up)
+        limits = np.array([group.sample.limit for group in groups], np.uint64)
+        sums, others = np.zeros((3, 4)), np.zeros(7)
+        picked = np.zeros(change.shape, np.uint8)
+        first = tile.first + row * tile.stride + column
+        _gather(change, sigma, kept, before, shares, first, tile.stride, limits, sums, others, picked)
+        x0, y0 = grid.centres(np.array(row), np.array(column))
+        weight, by_column, by_row, height, down, up, noise = others
+        self._place += (weight * x0 + by_column * grid.cell, weight * y0 - by_row * grid.step_north, height)
+        self._significant_down += down
+        self._significant_up += up
+        self._noise += _HALF_NORMAL * noise
+        if sums[0, 1] > 0:
+            self._sigma_known &= bool(np.isfinite(sums[0, 2]))
+            self._detected &= tile.significant is not None
+        for bit, (group, (metres, share, squares, count)) in enumerate(zip(groups, sums, strict=True)):
+            group.height += metres
+            group.weight += share
+            group.squares += squares
+            r, c = np.nonzero(picked & (1 << bit))
+            x, y = grid.centres(r + row, c + column)
+            group.sample.add(first + r * tile.stride + c, x, y, shares[r, c] * sigma[r, c], count=int(count))
 
     def volume(self, model: ErrorModel, systematic: Systematic) -> Volume:
         """Return the zone's volumes."""
@@ -157,3 +153,53 @@ class Tally:
             area=self._area,
             covered_percent=min(100.0, 100.0 * a * weight / self._area),
         )
+
+
+@njit(cache=True)  # pragma: no cover
+def _gather(
+    change: Array,
+    sigma: Array,
+    kept: NDArray[np.bool_],
+    before: Array,
+    shares: Array,
+    first: int,
+    stride: int,
+    limits: NDArray[np.uint64],
+    sums: Array,
+    others: Array,
+    picked: NDArray[np.uint8],
+) -> None:
+    """Add cells to sums (all, falling, rising; height, weight, squares, count) and mark those that the samples take (one bit each).
+
+    ``others``: weight, weight by column and by row, height before, significant fall and rise, sigma of what is not significant.
+    """
+    for r in range(change.shape[0]):
+        for c in range(change.shape[1]):
+            w, dh = shares[r, c], change[r, c]
+            if not w > 0.0 or np.isnan(dh):
+                continue
+            s = w * sigma[r, c]
+            hashed = mixed(first + r * stride + c)
+            side = 1 if dh < 0 else 2 if dh > 0 else 0
+            sums[0, 0] += w * dh
+            sums[0, 1] += w
+            sums[0, 2] += s * s
+            sums[0, 3] += 1.0
+            if hashed < limits[0]:
+                picked[r, c] |= 1
+            if side:
+                sums[side, 0] += w * dh
+                sums[side, 1] += w
+                sums[side, 2] += s * s
+                sums[side, 3] += 1.0
+                if hashed < limits[side]:
+                    picked[r, c] |= 1 << side
+            others[0] += w
+            others[1] += w * c
+            others[2] += w * r
+            others[3] += w * before[r, c]
+            if kept[r, c]:
+                others[4] += w * max(-dh, 0.0)
+                others[5] += w * max(dh, 0.0)
+            else:
+                others[6] += s
