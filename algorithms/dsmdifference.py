@@ -58,7 +58,8 @@ class DsmDifference(StepAlgorithm):
             tr("Co-registration"),
             tr(
                 "How the later surface is brought onto the earlier one on stable ground: not at all (none), by its median "
-                "height (vertical), by a tilted plane (plane), or also in plan (horizontal); auto chooses what that ground supports."
+                "height (vertical), by a tilted plane (plane), or also in plan (horizontal); auto chooses what that ground "
+                "supports."
             ),
             ("auto", "none", "vertical", "plane", "horizontal"),
             default="auto",

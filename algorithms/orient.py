@@ -32,8 +32,8 @@ class Orient(StepAlgorithm):
             tr("Camera model"),
             tr(
                 "brown: focal length, principal point, two radial and two tangential terms; radial: focal length, principal "
-                "point, two radial terms; simple_radial: one radial term; full: with rational radial terms, for wide lenses and many "
-                "photographs."
+                "point, two radial terms; simple_radial: one radial term; full: with rational radial terms, for wide lenses "
+                "and many photographs."
             ),
             ("brown", "radial", "simple_radial", "full"),
             default="brown",

@@ -36,13 +36,13 @@ class SimulateSurvey(StepAlgorithm):
         yield ask.number("LENGTH", tr("Length (m)"), tr("Of the beach, along the shore."), default=60.0)
         yield ask.number("WIDTH", tr("Width (m)"), tr("Of the beach, across the shore."), default=40.0)
         yield ask.crs("CRS", tr("CRS"), tr("A projected CRS in metres; empty: one is chosen."))
-        yield ask.number("HEIGHT", tr("Flying height (m)"), tr("Above the beach."), default=30.0)
+        yield ask.number("HEIGHT", tr("Flying height (m)"), tr("Above the beach."), default=50.0)
         yield ask.number(
             "FORWARD_OVERLAP", tr("Forward overlap (%)"), tr("Of one photograph with the next."), default=80.0, most=98.0
         )
         yield ask.number("SIDE_OVERLAP", tr("Side overlap (%)"), tr("Of one strip with the next."), default=70.0, most=98.0)
         yield ask.number(
-            "TILT", tr("Tilt (degrees)"), tr("How far the camera leans from the plumb line."), default=3.0, most=60.0
+            "TILT", tr("Tilt (degrees)"), tr("Standard deviation of the camera's lean from the plumb line."), default=3.0, most=60.0
         )
         yield ask.integer("CAMERA_WIDTH", tr("Image width (px)"), tr("Pixels across."), default=1600, least=64)
         yield ask.integer("CAMERA_HEIGHT", tr("Image height (px)"), tr("Pixels down."), default=1200, least=64)
@@ -73,6 +73,7 @@ class SimulateSurvey(StepAlgorithm):
         """Return the truth in numbers."""
         yield ask.result("IMAGE_COUNT", tr("Photographs per date"))
         yield ask.result("GSD", tr("Ground pixel (m)"))
+        yield ask.result("PRECISION", tr("Deviation of heights to expect (m)"))
         yield ask.result("EROSION", tr("True erosion (m3)"))
         yield ask.result("DEPOSITION", tr("True deposition (m3)"))
         yield ask.result("NET", tr("True net volume (m3)"))

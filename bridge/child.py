@@ -57,6 +57,8 @@ class Child:
             try:
                 line = self._lines.get(timeout=POLL)
             except queue.Empty:
+                if self._process.poll() is not None:
+                    self.stop()  # children that it left behind may hold its standard output open
                 continue
             if line is None:
                 return
