@@ -73,13 +73,15 @@ def _odm_crs(line: str, name: str) -> str:
         if 1 <= zone <= 60:
             return f"EPSG:{(32600 if utm[2].upper() == 'N' else 32700) + zone}"
     try:
-        CRS.from_user_input(line)
+        crs = CRS.from_user_input(line)
     except CRSError as error:
         raise InputError(
             f"The first line of {name} ({line[:60]!r}) names no CRS: write an EPSG code, a PROJ string or 'WGS84 UTM 11N'; "
             "of other programs' files only Metashape's marker XML is read, the rest goes in GCPS and MARKS."
         ) from error
-    return line
+    # A PROJ string has no name of its own; most mean a CRS that has one.
+    code = crs.to_epsg() if len(crs.axis_info) == 2 else None
+    return f"EPSG:{code}" if code else line
 
 
 def _xml(text: str, name: str) -> Given:

@@ -27,7 +27,7 @@ from .gcpfiles import read_gcp_file
 from .gnss import Gnss, gnss_of
 from .heights import HeightPlan, plan_heights, undulation
 from .similarity import Similarity
-from .solution import Seen, Solution, find_marks, solve
+from .solution import Seen, Solution, find_marks, place, solve
 from .sparse import block_from_model, read_model
 
 Array = NDArray[np.float64]
@@ -123,7 +123,8 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         progress.at(0.6)
         result, dome = _result(request, solution, inputs, block)
         georef = _georef(solution, inputs, result)
-        for text in inputs.warnings:
+        told = georeport.findings(solution, inputs, block, dome)
+        for text in told:
             progress.warn(text)
         standing = survey.record(STEP)
         if standing is None or standing.fingerprint != fingerprint or survey.is_stale(STEP) or not _complete(survey):
@@ -133,7 +134,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             georef.write(survey)
         progress.at(0.8)
         georeport.write_layers(request.residuals, request.photos, solution, inputs, block)
-        report = georeport.report(solution, inputs, result, block, dome)
+        report = georeport.report(solution, inputs, result, block, dome, told)
         report.save(survey.report_path(STEP), request.output_html_file)
         survey.finish(
             STEP,
@@ -247,13 +248,12 @@ def _solve(block: Block, inputs: Inputs, sigma_mark: float) -> Solution:
     places = [s.point.coordinates for s in seen if s.found is not None] or list(inputs.gnss.coordinates)
     if not places:
         raise NotEnoughData("There is neither a GCP nor a GNSS position with a height: give GCPS and MARKS, or GCP_FILE.")
-    comparable = inputs.heights.comparable
     first = LocalFrame.at(inputs.crs, *map(float, np.mean(places, axis=0)))
-    rough = solve(block, seen, inputs.gnss, frame=first, comparable=comparable)
+    rough = place(block, seen, inputs.gnss, first)
     # The origin belongs in the middle of the block, wherever the control lies; to whole metres, so that it stays put.
-    middle = first.to_crs(np.median(rough.fit.similarity.apply(block.points), axis=0)[None])[0]
+    middle = first.to_crs(np.median(rough.apply(block.points), axis=0)[None])[0]
     frame = LocalFrame.at(inputs.crs, *map(float, np.round(middle)))
-    return solve(block, seen, inputs.gnss, frame=frame, comparable=comparable)
+    return solve(block, seen, inputs.gnss, frame=frame, comparable=inputs.heights.comparable)
 
 
 def _enough(seen: Sequence[Seen], inputs: Inputs) -> None:

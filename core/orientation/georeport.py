@@ -80,7 +80,12 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
             f"The georeferencing is weak away from its points: sigma at the edge of the block is {_pair(*edge)}, in its "
             f"middle {_pair(*middle)}; put control near the edges."
         )
-    if "GNSS" in solution.based_on and len(inputs.gnss) and not inputs.gnss.declared and solution.based_on == "GNSS":
+    if solution.height_doubt > 0:
+        told.append(
+            "Without control points heights rest on the focal length, which vertical views of flat ground hardly determine: a "
+            f"doubt of {_metres(solution.height_doubt)} is added; one control point or tilted photographs remove it."
+        )
+    if solution.based_on == "GNSS" and not inputs.gnss.declared:
         told.append(
             "The photographs' GNSS carries no sigma: the whole block may be shifted by metres (more in height), which no "
             "residual shows; without control points do not compare it with another date before co-registration."
@@ -99,10 +104,10 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
     return told
 
 
-def report(solution: Solution, inputs: Inputs, result: Result, block: Block, dome: Doming | None) -> Report:
-    """Return the report page."""
+def report(solution: Solution, inputs: Inputs, result: Result, block: Block, dome: Doming | None, told: list[str]) -> Report:
+    """Return the report page; ``told`` are the findings."""
     page = Report("Georeference", verdict(solution, result))
-    for text in findings(solution, inputs, block, dome):
+    for text in told:
         page.warning(text)
     middle, edge = predicted(solution, block)
     page.heading("Accuracy")
@@ -206,6 +211,8 @@ def _residual_fields(solution: Solution) -> dict[str, Any]:
         "role": [_role(s) for s in seen],
         "marks": [s.marks for s in seen],
         **_components(solution.errors),
+        "dx": solution.errors[:, 0],  # what the arrows' style looks for
+        "dy": solution.errors[:, 1],
         "plani": np.hypot(solution.errors[:, 0], solution.errors[:, 1]),
         "sigma_h": [s.point.sigma_h for s in seen],
         "sigma_v": [s.point.sigma_v for s in seen],

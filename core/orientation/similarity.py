@@ -84,10 +84,10 @@ def umeyama(model: Array, ground: Array, weights: Array | None = None) -> Simila
     NotEnoughData
         When there are fewer than three points or they lie on one line, in either frame.
     """
-    similarity = _umeyama(np.asarray(model, float)[None], np.asarray(ground, float)[None], weights)[0]
-    if similarity is None:
+    scale, rotation, shift, good = _umeyama(np.asarray(model, float)[None], np.asarray(ground, float)[None], weights)
+    if len(model) < 3 or not good[0]:
         raise NotEnoughData("The points are fewer than three or lie on one line: add a point away from that line.")
-    return similarity
+    return Similarity(float(scale[0]), rotation[0], shift[0])
 
 
 def design_matrix(points: Array, pivot: Array) -> Array:
@@ -110,6 +110,7 @@ def fit(
     model_covariance: Array | None = None,
     shared: Shared | None = None,
     trust: bool = True,
+    start: Similarity | None = None,
 ) -> Fit:
     """Fit the similarity robustly.
 
@@ -125,6 +126,8 @@ def fit(
         An error common to some of the ground points.
     trust
         Whether the covariances are known: the variance factor is then never below 1. Otherwise it is estimated.
+    start
+        Where to start from, when something near is known.
 
     Raises
     ------
@@ -133,7 +136,8 @@ def fit(
     """
     model, ground = np.asarray(model, float), np.asarray(ground, float)
     n = len(model)
-    similarity = _start(model, ground, covariance)
+    umeyama(model, ground)  # refuses what does not determine a similarity
+    similarity = start or _start(model, ground, covariance)
     pivot = ground.mean(axis=0)
     # Without a shared error its three unknowns are held at 0 by a prior that nothing contradicts.
     shared = shared or Shared(np.zeros(n, bool), np.ones(3))
@@ -181,30 +185,21 @@ def principal_sigmas(points: Array) -> Array:
     return sigmas
 
 
-def _umeyama(models: Array, grounds: Array, weights: Array | None = None) -> list[Similarity | None]:
-    """Solve many sets (k, n, 3) at once; None for a set without three points off one line."""
+def _umeyama(models: Array, grounds: Array, weights: Array | None = None) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Solve many sets (k, n, 3) at once: scales (k,), rotations (k, 3, 3), shifts (k, 3), and which are determined (k,)."""
     count = models.shape[1]
-    if count < 3:
-        return [None] * len(models)
     w = np.full(count, 1.0 / count) if weights is None else np.asarray(weights, float) / np.sum(weights)
     mx, my = np.einsum("n,kni->ki", w, models), np.einsum("n,kni->ki", w, grounds)
     x, y = models - mx[:, None], grounds - my[:, None]
-    cross = np.einsum("n,kni,knj->kij", w, y, x)
-    u, d, vt = np.linalg.svd(cross)
+    u, d, vt = np.linalg.svd(np.einsum("n,kni,knj->kij", w, y, x))
     e = np.ones((len(models), 3))
     e[:, 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
     rotation = np.einsum("kij,kj,kjl->kil", u, e, vt)
     spread = np.einsum("n,kni,kni->k", w, x, x)
     # A line makes the second singular value vanish; a plane only the third.
     good = (d[:, 1] > 1e-10 * d[:, 0]) & (spread > 0)
-    solved: list[Similarity | None] = []
-    for i in range(len(models)):
-        if not good[i]:
-            solved.append(None)
-            continue
-        scale = float(d[i] @ e[i] / spread[i])
-        solved.append(Similarity(scale, rotation[i], my[i] - scale * rotation[i] @ mx[i]))
-    return solved
+    scale = np.sum(d * e, axis=1) / np.where(good, spread, 1.0)
+    return scale, rotation, my - scale[:, None] * np.einsum("kij,kj->ki", rotation, mx), good
 
 
 def _start(model: Array, ground: Array, covariance: Array) -> Similarity:
@@ -221,13 +216,12 @@ def _start(model: Array, ground: Array, covariance: Array) -> Similarity:
     else:
         rng = np.random.default_rng(0)
         triples = np.array([rng.choice(n, 3, replace=False) for _ in range(_START_TRIPLES)])
-    best, least = everything, np.inf
-    for similarity in [everything, *(s for s in _umeyama(model[triples], ground[triples]) if s is not None)]:
-        lengths, _ = _standardised(ground - similarity.apply(model), covariance)
-        score = float(np.sort(np.hypot(*lengths.T))[(n + 4) // 2 - 1])
-        if score < least:
-            best, least = similarity, score
-    return best
+    scale, rotation, shift, good = _umeyama(model[triples], ground[triples])
+    left = ground - scale[:, None, None] * np.einsum("kij,nj->kni", rotation, model) - shift[:, None]
+    squares = np.einsum("kni,nij,knj->kn", left, np.linalg.inv(covariance), left, optimize=True)
+    scores = np.where(good, np.sort(squares, axis=1)[:, (n + 4) // 2 - 1], np.inf)
+    best = int(np.argmin(scores))
+    return Similarity(float(scale[best]), rotation[best], shift[best]) if good[best] else everything
 
 
 def _total_covariance(ground: Array, model: Array | None, similarity: Similarity) -> Array:

@@ -14,7 +14,7 @@ from ..errors import InputError, NotEnoughData
 from ..frames import LocalFrame
 from .control import GroundPoint
 from .gnss import SHARED, Gnss, antenna_offsets
-from .similarity import Fit, Shared, fit
+from .similarity import Fit, Shared, Similarity, fit
 from .triangulation import Triangulated, triangulate
 
 Array = NDArray[np.float64]
@@ -49,7 +49,8 @@ class Solution:
 
     ``based_on`` is "control", "control and GNSS" or "GNSS". Arrays follow ``seen`` (n) and the GNSS positions (g); errors are
     computed minus given in easting, northing, height of the CRS, NaN where there is none. ``loo`` are leave-one-out errors of the
-    control points, ``loo_sigma`` their predicted sigmas.
+    control points, ``loo_sigma`` their predicted sigmas. ``height_doubt`` (m) is what the focal length adds to the heights' sigma
+    when no control point holds them.
     """
 
     frame: LocalFrame
@@ -62,6 +63,7 @@ class Solution:
     blunders: tuple[Blunder, ...]
     gnss_errors: Array
     gnss_blunders: tuple[Blunder, ...]
+    height_doubt: float
 
 
 def find_marks(block: Block, points: Sequence[GroundPoint], sigma_mark: float) -> tuple[Seen, ...]:
@@ -78,6 +80,12 @@ def find_marks(block: Block, points: Sequence[GroundPoint], sigma_mark: float) -
         wrong = () if found is None else tuple(m.image for m, used in zip(marks, found.used, strict=True) if not used)
         seen.append(Seen(point, found, len(marks), wrong))
     return tuple(seen)
+
+
+def place(block: Block, seen: tuple[Seen, ...], gnss: Gnss, frame: LocalFrame) -> Similarity:
+    """Return a first similarity, to learn where the block is; raises what ``solve`` raises."""
+    used = np.array([s.found is not None and not s.point.check for s in seen], bool)
+    return _choose(_Solver(block, seen, gnss, frame), used)[1].similarity
 
 
 def solve(block: Block, seen: tuple[Seen, ...], gnss: Gnss, *, frame: LocalFrame, comparable: bool) -> Solution:
@@ -98,19 +106,23 @@ def solve(block: Block, seen: tuple[Seen, ...], gnss: Gnss, *, frame: LocalFrame
         )
     with_gnss, solved = _choose(solver, used)
     solver.with_gnss = with_gnss
-    blunders = _blunders(solver, used) if used.sum() >= 4 else []
+    blunders = _blunders(solver, used, solved)
     if blunders:
         solver.distrust(blunders)
         solved = solver.fit(used)
     _look_down(block, solved)
-    loo, loo_sigma = _leave_one_out(solver, used)
+    loo, loo_sigma = _leave_one_out(solver, used, solved)
     blunders += _wrong_checks(solver, solved)
     based = "GNSS" if not used.any() else "control and GNSS" if with_gnss else "control"
     gnss_errors = solver.gnss_errors(solved)
     suspicious = _gnss_blunders(solver, solved) if with_gnss else []
-    return Solution(
-        frame, solved, based, seen, solver.errors(solved), loo, loo_sigma, tuple(blunders), gnss_errors, tuple(suspicious)
-    )
+    doubt = 0.0 if used.any() else _height_doubt(block, solved)
+    errors = solver.errors(solved)
+    if doubt > 0:
+        covariance = solved.covariance.copy()
+        covariance[2, 2] += doubt**2
+        solved = replace(solved, covariance=covariance)
+    return Solution(frame, solved, based, seen, errors, loo, loo_sigma, tuple(blunders), gnss_errors, tuple(suspicious), doubt)
 
 
 class _Solver:
@@ -129,10 +141,11 @@ class _Solver:
         self.centres = np.array([block.views[i].centre for i in gnss.view]).reshape(-1, 3)
         self.antennas = frame.from_crs(gnss.coordinates) if len(gnss) else self.centres
 
-    def fit(self, used: NDArray[np.bool_]) -> Fit:
+    def fit(self, used: NDArray[np.bool_], start: Similarity | None = None) -> Fit:
         """Fit on the used points, and on the positions when ``with_gnss``."""
         if not self.with_gnss:
-            return fit(self.model[used], self.ground[used], self.covariance[used], model_covariance=self.model_covariance[used])
+            own = self.model_covariance[used]
+            return fit(self.model[used], self.ground[used], self.covariance[used], model_covariance=own, start=start)
         members = np.concatenate([np.zeros(int(used.sum()), bool), np.ones(len(self.gnss), bool)])
         alone = not used.any()
         # Beside GCPs the positions' shared error is free: GCPs set the level. Alone, declared sigmas are taken at their word.
@@ -147,6 +160,7 @@ class _Solver:
                 model_covariance=np.concatenate([self.model_covariance[used], np.zeros((len(self.gnss), 3, 3))]),
                 shared=shared,
                 trust=not alone or self.gnss.declared,
+                start=start,
             )
             offsets = antenna_offsets(self.block.views, self.gnss, solved.similarity)
         return solved
@@ -247,21 +261,37 @@ def _look_down(block: Block, solved: Fit) -> None:
         )
 
 
-def _leave_one_out(solver: _Solver, used: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _height_doubt(block: Block, solved: Fit) -> float:
+    """Return the sigma (m) that an uncertain focal length gives to heights below cameras held by GNSS; 0 where views tilt.
+
+    Vertical views from one height over flat ground trade focal length for depth. A simulation of 28 photographs, RTK and 12,000
+    tie points gave 0.4 % of the height with half a degree of tilt and next to no relief, 0.1 % with two degrees and some.
+    """
+    looks = np.array([solved.similarity.rotation @ v.rotation.T @ [0.0, 0.0, 1.0] for v in block.views])
+    tilt = float(np.sqrt(np.mean(np.arccos(np.clip(-looks[:, 2], -1.0, 1.0)) ** 2)))
+    ground = solved.similarity.apply(block.points)[:, 2]
+    centres = solved.similarity.apply(np.array([v.centre for v in block.views]))[:, 2]
+    height = float(np.median(centres) - np.median(ground))
+    relief = float(np.hypot(np.std(centres), np.subtract(*np.percentile(ground, [84, 16])) / 2)) / height
+    strength = max(tilt / np.radians(2.0), relief / 0.02)  # 1 where the simulation said 0.1 %
+    return 0.0 if strength > 5.0 else height * min(0.004, 0.001 / strength)
+
+
+def _leave_one_out(solver: _Solver, used: NDArray[np.bool_], whole: Fit) -> tuple[Array, Array]:
     errors, sigmas = np.full((len(used), 3), np.nan), np.full((len(used), 3), np.nan)
     if used.sum() < 4:
         return errors, sigmas
     for i in map(int, np.flatnonzero(used)):
         rest = used.copy()
         rest[i] = False
-        solved = _fit_or_none(solver, rest)
+        solved = _fit_or_none(solver, rest, whole)
         if solved is not None:
             errors[i] = solver.errors(solved)[i]
             sigmas[i] = np.sqrt(np.diag(solver.predicted(solved, i)))
     return errors, sigmas
 
 
-def _blunders(solver: _Solver, used: NDArray[np.bool_]) -> list[Blunder]:
+def _blunders(solver: _Solver, used: NDArray[np.bool_], whole: Fit) -> list[Blunder]:
     """Name the control points that the others contradict, the worst first, each tested without those already named."""
     named: list[Blunder] = []
     trusted = used.copy()
@@ -270,7 +300,7 @@ def _blunders(solver: _Solver, used: NDArray[np.bool_]) -> list[Blunder]:
         for i in map(int, np.flatnonzero(trusted)):
             rest = trusted.copy()
             rest[i] = False
-            solved = _fit_or_none(solver, rest)
+            solved = _fit_or_none(solver, rest, whole)
             if solved is None:
                 continue
             error = solver.errors(solved)[i]
@@ -284,10 +314,10 @@ def _blunders(solver: _Solver, used: NDArray[np.bool_]) -> list[Blunder]:
     return named
 
 
-def _fit_or_none(solver: _Solver, rest: NDArray[np.bool_]) -> Fit | None:
-    """Fit without a point; None when the others alone do not determine the similarity."""
+def _fit_or_none(solver: _Solver, rest: NDArray[np.bool_], whole: Fit) -> Fit | None:
+    """Fit without a point, starting from the fit with it; None when the others alone do not determine the similarity."""
     try:
-        solved = solver.fit(rest)
+        solved = solver.fit(rest, whole.similarity)
     except NotEnoughData:
         return None
     return None if _undetermined(solved, "-") else solved

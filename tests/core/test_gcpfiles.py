@@ -67,7 +67,14 @@ def test_encodings(tmp_path, encoding):
 
 
 @pytest.mark.parametrize(
-    ("line", "crs"), [("WGS84 UTM 7S", "EPSG:32707"), ("wgs84 utm 60 n", "EPSG:32660"), ("epsg:2154", "epsg:2154")]
+    ("line", "crs"),
+    [
+        ("WGS84 UTM 7S", "EPSG:32707"),
+        ("wgs84 utm 60 n", "EPSG:32660"),
+        ("epsg:2154", "EPSG:2154"),
+        ("+proj=utm +zone=11 +datum=WGS84", "EPSG:32611"),
+        ("EPSG:2263+6360", "EPSG:2263+6360"),
+    ],
 )
 def test_odm_crs(tmp_path, line, crs):
     assert read(tmp_path, f"{line}\n1 2 3 4 5 a.jpg P\n").crs == crs

@@ -395,6 +395,18 @@ def test_gnss_alone(tmp_path):
     assert "may be shifted by metres" in scene.report()
 
 
+def test_a_wrong_position_is_named(tmp_path):
+    scene = Scene(tmp_path, gnss_noise=0.1)
+    photographs = list(scene.survey.photographs)
+    position = photographs[3].position
+    photographs[3] = replace(photographs[3], position=replace(position, latitude=position.latitude + 2e-4))  # 22 m
+    survey = Survey.create(tmp_path / "survey", tmp_path, scene.survey.crs, photographs)
+    survey.finish("orient", "1", built_on=(), parameters={}, result={})
+    run(scene.request([], gnss=True))
+    assert "The GNSS position of DJI_0004.JPG is off by 22" in scene.report()
+    assert np.abs(scene.errors().mean(axis=0)).max() < 0.3  # least squares shifts the block by 2 m
+
+
 def test_gnss_with_declared_sigmas_is_taken_at_its_word(tmp_path):
     scene = Scene(tmp_path, gnss_noise=0.03, gnss_sigma=0.03)
     run(scene.request([], gnss=True))
