@@ -177,6 +177,7 @@ def write_layer(
             crs=CRS.from_user_input(crs).to_wkt() if crs else None,
             layer=layer,
             driver="GPKG",
+            dataset_options={"VERSION": "1.3"},  # 1.4 makes older GDAL, of QGIS 3.22 for one, complain
         )
 
 
