@@ -39,8 +39,9 @@ STEP = "georeference"
 class Request:
     """Sigmas in metres (``sigma_mark`` in pixels); ``residuals`` and ``photos`` are GeoPackages to write.
 
-    ``check`` is names separated by commas; ``lever_arm`` three numbers (right, forward, up; m); ``geoid`` the path of a raster
-    or a number (m).
+    ``marks`` has the columns gcp, image, x, y: pixels from the CORNER of the top-left pixel (ODM's file counts from its
+    centre and is brought to that). ``check`` is names separated by commas; ``lever_arm`` three numbers from the projection
+    centre to the antenna (right, forward, up; m); ``geoid`` the path of a raster or a number (m).
     """
 
     survey: str

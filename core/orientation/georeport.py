@@ -286,6 +286,8 @@ def _map(solution: Solution, inputs: Inputs, block: Block) -> Figure:
         axes.vlines(at[arrows, 0], at[arrows, 1], at[arrows, 1] + grow * errors[arrows, 2], color=colour, alpha=0.3, linewidth=4)
         options: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "color": colour, "width": 0.003}
         axes.quiver(at[arrows, 0], at[arrows, 1], grow * errors[arrows, 0], grow * errors[arrows, 1], **options)
+    for seen, at in zip(solution.seen, places, strict=True):
+        axes.annotate(seen.point.name, at[:2], xytext=(5, 5), textcoords="offset points", fontsize=8)
     axes.set(xlabel=f"easting - {origin[0]:.0f} m", ylabel=f"northing - {origin[1]:.0f} m", aspect="equal")
     axes.set_title(f"Errors enlarged {grow:g} times", fontsize=10)
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
