@@ -22,6 +22,8 @@ RADIANCE_UNIT = 1.0 / 20000  # of the stored radiance; that of dry flat sand is 
 _SKY = 0.6  # share of the light that comes from the whole sky; haze keeps beaches low in contrast
 _LATTICE = 4  # pixels between exact rays; linear in between they err by less than 0.001 px
 _BLACK, _WHITE = 0.25, 1.9  # paint, relative to dry sand
+_ONE_HIT = 0.95  # of |m| times the steepest slope; below it a ray meets the surface once
+_CLOSE = 2e-5  # m, how near to the surface a ray is followed: 0.001 px
 _PLANES = 3  # sand, paint, sea
 
 
@@ -136,7 +138,7 @@ class Scene:
         f, points = self.field, np.empty((len(rays), 3))
         for i, ray in enumerate(rays):
             mx, my = ray[0] / -ray[2], ray[1] / -ray[2]
-            t = _trace(self.heights, f.a, f.c, 1 / f.cell, *view.centre, mx, my, self.top, self.steepest)
+            t = _trace(self.heights, f.a, f.c, 1 / f.cell, *view.centre, mx, my, self.top, self.steepest, 0.0)
             points[i] = view.centre + t * np.array([mx, my, -1.0])
         return points
 
@@ -185,25 +187,29 @@ def _height(heights: Any, a: float, c: float, inv: float, x: float, y: float) ->
 @njit(cache=True, nogil=True)
 def _trace(
     heights: Any, a: float, c: float, inv: float, x0: float, y0: float, z0: float, mx: float, my: float,
-    top: float, steepest: float,
+    top: float, steepest: float, guess: float,
 ) -> float:  # fmt: skip
     """Return how far below (m) the ray (mx, my, -1) from (x0, y0, z0) meets the surface first.
 
-    Sphere tracing: where the ray is ``gap`` above a surface no steeper than ``steepest``, it can not meet it within
-    ``gap / (1 + |m| steepest)``. Newton's step ends it.
+    Where the ray is steeper than the surface anywhere, it meets it once, and t = z0 - z(t) is a contraction by at most
+    |m| ``steepest``, from any ``guess``. Else sphere tracing from the ``top``: where the ray is ``gap`` above a surface no
+    steeper than ``steepest``, it can not meet it within ``gap / (1 + |m| steepest)``.
     """
+    lean = math.sqrt(mx * mx + my * my) * steepest
+    if lean < _ONE_HIT:
+        t = guess
+        for _ in range(500):
+            gap = z0 - t - _height(heights, a, c, inv, x0 + mx * t, y0 + my * t)
+            t += gap
+            if abs(gap) < _CLOSE:
+                break
+        return t
     t = z0 - top
-    pace = 1.0 / (1.0 + math.sqrt(mx * mx + my * my) * steepest)
-    for _ in range(500):
+    for _ in range(5000):
         gap = z0 - t - _height(heights, a, c, inv, x0 + mx * t, y0 + my * t)
-        if gap < 5e-4:
+        t += gap / (1.0 + lean)
+        if gap < _CLOSE:
             break
-        t += gap * pace
-    probe = 2e-3
-    gap = z0 - t - _height(heights, a, c, inv, x0 + mx * t, y0 + my * t)
-    later = z0 - t - probe - _height(heights, a, c, inv, x0 + mx * (t + probe), y0 + my * (t + probe))
-    if gap - later > 0.1 * probe:
-        t += probe * gap / (gap - later)
     return t
 
 
@@ -213,6 +219,7 @@ def _render(
     centre: Any, world_from_camera: Any, rays: Any, targets: Any, half: float, sea: int, out: Any,
 ) -> None:  # fmt: skip
     inv, fine = 1.0 / cell, FINE / cell
+    t = centre[2] - top
     reach = 2.5 * half * half
     m = world_from_camera
     for row in range(out.shape[1]):
@@ -233,7 +240,7 @@ def _render(
                 down = -(m[2, 0] * dx + m[2, 1] * dy + m[2, 2])
                 mx = (m[0, 0] * dx + m[0, 1] * dy + m[0, 2]) / down
                 my = (m[1, 0] * dx + m[1, 1] * dy + m[1, 2]) / down
-                t = _trace(heights, a, c, inv, centre[0], centre[1], centre[2], mx, my, top, steepest)
+                t = _trace(heights, a, c, inv, centre[0], centre[1], centre[2], mx, my, top, steepest, t)
                 x, y, z = centre[0] + mx * t, centre[1] + my * t, centre[2] - t
                 if k == 0 and side == 2:
                     for n in range(targets.shape[0]):
