@@ -164,7 +164,7 @@ def _notes(inspections: list[Inspection]) -> list[str]:
     twins = defaultdict(list)
     for p in photographs:
         twins[p.digest].append(p.name)
-    same = [" = ".join(n) for n in twins.values() if len(n) > 1]
+    same = [" = ".join(n[:3]) + (" ..." if len(n) > 3 else "") for n in twins.values() if len(n) > 1]
     if same:
         notes.append(f"The same photograph is there more than once: {some(same)}.")
     if len(photographs) == 1:

@@ -65,7 +65,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     Survey.open(request.survey)  # before a lock is put into a folder that is none
     with held(request.survey, "enhance"):
         survey = Survey.open(request.survey)
-        standing = survey.require("createsurvey")
+        survey.require("createsurvey")
         photographs = [p for p in survey.photographs if p.decodable]
         _check(request, survey, photographs, progress)
         folder = survey.folder.absolute() / _FOLDER / _parameters_name(request.method, request.window)
@@ -89,7 +89,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         write_report(survey, photographs, images, contrasts, request.method, request.window, request.output_html_file)
         survey.finish(
             "enhance",
-            digest(standing.fingerprint, key),
+            digest(keys),
             built_on=("createsurvey",),
             parameters={"method": request.method, "window": request.window},
             result={"folder": f"{_FOLDER}/{folder.name}", "images": len(images)},

@@ -54,7 +54,8 @@ def read_metadata(data: bytes) -> Metadata:
 
     A position and its height are EXIF's. Where the XMP gives the sigmas of an RTK receiver, position and absolute
     altitude are the XMP's, since it is they that have those sigmas; and so they are where EXIF has none. 0, 0 is what
-    receivers write before they know, and is no position.
+    receivers write before they know, and is no position. EXIF's ``GPSHPositioningError`` does not say how probable it
+    is; it is taken as one sigma.
     """
     problems: list[str] = []
     base: dict[int, Any] = {}
