@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from pathlib import PurePosixPath
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -18,21 +16,11 @@ from ..errors import InputError
 from ..frames import transformer
 from ..survey import Photograph
 from ..vector import Layer, read_layer
+from .marks import Mark, key_of, listed, marks_of_table, match_marks
 
 Array = NDArray[np.float64]
 
-_SAME_PLACE = 3.0  # pixels
 _ROLES = {"": "control", "control": "control", "gcp": "control", "check": "check", "checkpoint": "check", "check point": "check"}
-
-
-@dataclass(frozen=True)
-class Mark:
-    """Where a ground point was seen: pixels from the corner of the top-left pixel, x right, y down."""
-
-    gcp: str
-    image: str
-    x: float
-    y: float
 
 
 @dataclass(frozen=True)
@@ -101,7 +89,7 @@ def given_from_layers(
     coordinates = _coordinates(layer, names, height_field)
     columns = [layer.numbers(f) if f else np.full(len(layer), np.nan) for f in (sigma_h_field, sigma_v_field)]
     roles = tuple(layer.text(role_field)) if role_field else ()
-    seen = tuple(_marks(read_layer(marks))) if marks else ()
+    seen = tuple(marks_of_table(read_layer(marks))) if marks else ()
     return Given(layer.name, layer.crs, tuple(names), coordinates, roles, np.stack(columns, axis=1), seen)
 
 
@@ -122,7 +110,7 @@ def control_from(
         When names repeat, a role or CHECK name is unknown, a sigma is not positive, marks lie outside their photograph or
         repeat, or nothing matches.
     """
-    keys = [_key(name) for name in given.names]
+    keys = [key_of(name) for name in given.names]
     repeated = sorted({n for n, k in zip(given.names, keys, strict=True) if keys.count(k) > 1})
     if repeated:
         raise InputError(f"Points of {given.where} share a name ({', '.join(repeated)}): give each its own.")
@@ -130,20 +118,20 @@ def control_from(
     notes = _zero_heights(given)
     roles = [_role(given.where, role) for role in given.roles] or [False] * len(keys)
     for name in filter(None, (n.strip() for n in (check or "").split(","))):
-        if _key(name) not in keys:
+        if key_of(name) not in keys:
             raise InputError(f"The check point {name!r} of CHECK is not in {given.where}; it has {', '.join(given.names)}.")
-        roles[keys.index(_key(name))] = True
+        roles[keys.index(key_of(name))] = True
     sigmas = np.full((len(keys), 2), np.nan) if given.sigmas is None else given.sigmas
     sigmas = np.where(np.isnan(sigmas), [sigma_h, sigma_v], sigmas)
     for name, pair in zip(given.names, sigmas, strict=True):
         if pair.min() <= 0:
             raise InputError(f"The sigma of {name} in {given.where} is not positive: give a number of metres above 0.")
-    matched, unmatched = _matched(given, keys, photographs)
+    matched, unmatched = match_marks(given.where, given.marks, given.names, photographs)
     points = [
-        GroundPoint(n, c, r, float(s[0]), float(s[1]), tuple(matched[k]))
-        for n, k, c, r, s in zip(given.names, keys, coordinates, roles, sigmas, strict=True)
+        GroundPoint(n, c, r, float(s[0]), float(s[1]), matched[n])
+        for n, c, r, s in zip(given.names, coordinates, roles, sigmas, strict=True)
     ]
-    return Control(tuple(points), tuple(notes + unmatched + _same_place(points)), given.where)
+    return Control(tuple(points), tuple(notes + unmatched), given.where)
 
 
 def in_metres(given: Given, crs: str) -> Array:
@@ -163,7 +151,7 @@ def in_metres(given: Given, crs: str) -> Array:
     missing = [n for n, c in zip(given.names, given.coordinates, strict=True) if not np.isfinite(c).all()]
     if missing:
         raise InputError(
-            f"{_listed(missing)} of {given.where} {_have(missing)} no complete coordinates (with height): fill them in."
+            f"{listed(missing)} of {given.where} {_have(missing)} no complete coordinates (with height): fill them in."
         )
     x, y, height = given.coordinates.T
     if source.is_projected and np.abs(x).max() <= 180 and np.abs(y).max() <= 90 and max(np.ptp(x), np.ptp(y)) < 1:
@@ -185,97 +173,6 @@ def in_metres(given: Given, crs: str) -> Array:
     return moved
 
 
-def match_photograph(image: str, photographs: Sequence[Photograph]) -> str | None:
-    """Return the name of the photograph that ``image`` means, None for none.
-
-    Case, blanks, missing or other extensions and missing or additional folders are forgiven.
-
-    Raises
-    ------
-    InputError
-        When several photographs match equally well.
-    """
-    wanted = _path(image)
-    paths = {photo.name: _path(photo.name) for photo in photographs}
-    for found in (
-        [name for name, path in paths.items() if path.name == wanted.name],
-        [name for name, path in paths.items() if path.stem == wanted.name],
-        [name for name, path in paths.items() if path.stem == wanted.stem],
-    ):
-        if len(found) > 1:
-            common = [_common_tail(paths[name].parent, wanted.parent) for name in found]
-            if common.count(max(common)) > 1:
-                raise InputError(f"The marked image {image!r} could be {' or '.join(found)}: name it with its folder.")
-            return found[common.index(max(common))]
-        if found:
-            return found[0]
-    return None
-
-
-@dataclass
-class _Unmatched:
-    images: dict[str, None] = field(default_factory=dict)  # ordered sets
-    points: dict[str, None] = field(default_factory=dict)
-
-    def notes(self) -> list[str]:
-        told = []
-        if self.images:
-            told.append(f"Marks in images that are not in the survey were left out: {_listed(list(self.images))}.")
-        if self.points:
-            told.append(f"Marks of points that are not among the GCPs were left out: {_listed(list(self.points))}.")
-        return told
-
-
-def _matched(
-    given: Given, keys: Sequence[str], photographs: Sequence[Photograph]
-) -> tuple[defaultdict[str, list[Mark]], list[str]]:
-    by_name = {p.name: p for p in photographs}
-    known: dict[str, str | None] = {}
-    matched: defaultdict[str, list[Mark]] = defaultdict(list)
-    unmatched = _Unmatched()
-    for mark in given.marks:
-        if mark.image not in known:
-            known[mark.image] = match_photograph(mark.image, photographs)
-        name, key = known[mark.image], _key(mark.gcp)
-        if key not in keys:
-            unmatched.points[mark.gcp] = None
-            continue
-        if name is None:
-            unmatched.images[mark.image] = None
-            continue
-        photo = by_name[name]
-        if not (0 <= mark.x <= photo.width and 0 <= mark.y <= photo.height):
-            raise InputError(
-                f"The mark of {mark.gcp} in {name} at ({mark.x:g}, {mark.y:g}) lies outside the photograph of "
-                f"{photo.width} x {photo.height} pixels: correct or remove it."
-            )
-        twin = next((m for m in matched[key] if m.image == name), None)
-        if twin is None:
-            matched[key].append(Mark(mark.gcp, name, mark.x, mark.y))
-        elif max(abs(twin.x - mark.x), abs(twin.y - mark.y)) > 0.01:
-            raise InputError(
-                f"{mark.gcp} is marked twice in {name}, at ({twin.x:g}, {twin.y:g}) and ({mark.x:g}, {mark.y:g}): remove one."
-            )
-    if given.marks and not matched:
-        images = _listed(sorted({m.image for m in given.marks}))
-        raise InputError(f"No mark of {given.where} matches a point and a photograph of the survey: the marks name {images}.")
-    return matched, unmatched.notes()
-
-
-def _same_place(points: Sequence[GroundPoint]) -> list[str]:
-    """Return notes on marks of different points at one place of a photograph: one of them must be wrong."""
-    told, known = [], defaultdict[str, list[tuple[str, Mark]]](list)
-    for point in points:
-        for mark in point.marks:
-            for other, twin in known[mark.image]:
-                if np.hypot(twin.x - mark.x, twin.y - mark.y) < _SAME_PLACE:
-                    told.append(
-                        f"{other} and {point.name} are marked at the same place in {mark.image}: one of the two is wrong."
-                    )
-            known[mark.image].append((point.name, mark))
-    return told
-
-
 def _coordinates(layer: Layer, names: Sequence[str], height_field: str | None) -> Array:
     if layer.geometry is None:
         raise InputError(f"{layer.name} is a table without geometry: give GCPS as a layer of points.")
@@ -292,23 +189,12 @@ def _coordinates(layer: Layer, names: Sequence[str], height_field: str | None) -
     return coordinates
 
 
-def _marks(table: Layer) -> Iterable[Mark]:
-    if not len(table):
-        raise InputError(f"The table {table.name} of marks is empty: add marks (gcp, image, x, y).")
-    gcps, images = table.text("gcp"), table.text("image")
-    x, y = table.numbers("x"), table.numbers("y")
-    for i, (gcp, image) in enumerate(zip(gcps, images, strict=True)):
-        if not gcp or not image or not np.isfinite([x[i], y[i]]).all():
-            raise InputError(f"The row {i + 1} of {table.name} is not complete (gcp, image, x, y): fill it in or remove it.")
-        yield Mark(gcp, image, float(x[i]), float(y[i]))
-
-
 def _zero_heights(given: Given) -> list[str]:
     zero = given.coordinates[:, 2] == 0.0
     if zero.all():
         return [f"All heights of {given.where} are 0: the ground is forced level through them, and heights mean nothing else."]
     names = [n for n, z in zip(given.names, zero, strict=True) if z]
-    return [f"{_listed(names)} of {given.where} {_have(names)} height 0 unlike the others: is it missing?"] if names else []
+    return [f"{listed(names)} of {given.where} {_have(names)} height 0 unlike the others: is it missing?"] if names else []
 
 
 def _role(where: str, role: str) -> bool:
@@ -316,28 +202,6 @@ def _role(where: str, role: str) -> bool:
     if known is None:
         raise InputError(f"The role {role!r} in {where} is not known: use control or check.")
     return known == "check"
-
-
-def _key(name: str) -> str:
-    return " ".join(name.casefold().split())
-
-
-def _path(name: str) -> PurePosixPath:
-    return PurePosixPath(_key(name).replace("\\", "/"))
-
-
-def _common_tail(a: PurePosixPath, b: PurePosixPath) -> int:
-    count = 0
-    for left, right in zip(reversed(a.parts), reversed(b.parts), strict=False):
-        if left != right:
-            break
-        count += 1
-    return count
-
-
-def _listed(names: Sequence[str], most: int = 8) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
 
 
 def _have(names: Sequence[str]) -> str:

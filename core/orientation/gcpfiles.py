@@ -15,7 +15,8 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from ..errors import InputError
-from .control import Given, Mark
+from .control import Given
+from .marks import Mark
 
 _UTM = re.compile(r"WGS\s*84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
 _ODM_HALF_PIXEL = 0.5  # ODM counts from the centre of the top-left pixel, we from its corner

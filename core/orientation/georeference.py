@@ -15,19 +15,18 @@ from ..block import Block
 from ..contract import VectorSource, encode
 from ..errors import InputError, NotEnoughData
 from ..files import digest, whole
-from ..frames import LocalFrame, projected_crs
+from ..frames import LocalFrame
 from ..georef import FOLDER, Georef
 from ..progress import SILENT, Progress
 from ..survey import Survey, held
-from ..vector import check_destination, polygons
+from ..vector import check_destination
 from . import georeport
 from .accuracy import Doming, alti, doming, plani
-from .control import Control, Given, control_from, given_from_layers
-from .gcpfiles import read_gcp_file
-from .gnss import Gnss, gnss_of
-from .heights import HeightPlan, plan_heights, undulation
+from .findings import findings, ground_pixel, verdict
+from .inputs import Inputs, gather, read_given
+from .observations import Seen, find_marks
 from .similarity import Similarity
-from .solution import Seen, Solution, find_marks, place, solve
+from .solution import Solution, place, solve
 from .sparse import block_from_model, read_model
 
 Array = NDArray[np.float64]
@@ -88,17 +87,6 @@ class Result:
     doming: float | None
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """All that the user gave, read, checked and in the survey's CRS (WKT2)."""
-
-    crs: str
-    control: Control
-    gnss: Gnss
-    heights: HeightPlan
-    warnings: tuple[str, ...]
-
-
 def run(request: Request, progress: Progress = SILENT) -> Result:
     """Georeference the survey.
 
@@ -114,17 +102,17 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     with held(survey.folder, STEP):
         survey = Survey.open(request.survey)
         oriented = survey.require("orient")
-        given = _given(request)
+        given = read_given(request)
         model = read_model(survey.folder / "model")
         block = block_from_model(model)
         progress.at(0.3)
-        inputs = _inputs(request, survey, given, block)
+        inputs = gather(request, survey, given, block)
         fingerprint = _fingerprint(request, inputs, oriented.fingerprint)
         solution = _solve(block, inputs, request.sigma_mark)
         progress.at(0.6)
         result, dome = _result(request, solution, inputs, block)
         georef = _georef(solution, inputs, result)
-        told = georeport.findings(solution, inputs, block, dome)
+        told = findings(solution, inputs, block, dome)
         for text in told:
             progress.warn(text)
         standing = survey.record(STEP)
@@ -144,7 +132,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             parameters=encode(request),
             result=encode(result),
         )
-        progress.info(georeport.verdict(solution, result))
+        progress.info(verdict(solution, result))
         progress.at(1.0)
     return result
 
@@ -173,65 +161,6 @@ def _check_parameters(request: Request) -> None:
     for path in (request.residuals, request.photos):
         if path:
             check_destination(path)
-
-
-def _given(request: Request) -> Given | None:
-    if request.gcp_file:
-        return read_gcp_file(request.gcp_file)
-    if request.gcps is None:
-        return None
-    return given_from_layers(
-        request.gcps,
-        request.marks,
-        name_field=request.name_field,
-        height_field=request.height_field,
-        role_field=request.role_field,
-        sigma_h_field=request.sigma_h_field,
-        sigma_v_field=request.sigma_v_field,
-    )
-
-
-def _inputs(request: Request, survey: Survey, given: Given | None, block: Block) -> Inputs:
-    crs = _crs(request, survey, given)
-    control = Control()
-    if given is not None:
-        control = control_from(
-            given, crs, survey.photographs, sigma_h=request.sigma_h, sigma_v=request.sigma_v, check=request.check
-        )
-    photographs = survey.photographs if request.use_gnss else ()
-    gnss = gnss_of(block.views, photographs, crs, request.lever_arm)
-    warnings = list(control.notes)
-    plan = plan_heights(
-        request.gcp_heights,
-        request.gnss_heights,
-        geoid=bool(request.geoid),
-        with_gcps=bool(control.points),
-        with_gnss=len(gnss) > 0,
-    )
-    if plan.sign and request.geoid:
-        raised = gnss.coordinates.copy()
-        raised[:, 2] += plan.sign * undulation(request.geoid, raised, crs)
-        gnss = Gnss(gnss.view, raised, gnss.sigmas, gnss.declared, gnss.lever)
-    elif request.geoid:
-        warnings.append("GEOID changes nothing here: no GNSS heights have to be brought to another kind.")
-    if not plan.comparable:
-        warnings.append(
-            "GNSS and GCP heights are of different kinds and there is no GEOID: GNSS heights are used for differences only, and "
-            "ALTI_GNSS is not determined."
-        )
-    if request.ignore is not None:
-        polygons(request.ignore, crs)
-        warnings.append("IGNORE has no effect on a similarity, which uses no tie points.")
-    return Inputs(crs, control, gnss, plan, tuple(warnings))
-
-
-def _crs(request: Request, survey: Survey, given: Given | None) -> str:
-    for text in (request.crs, survey.crs):
-        if text:
-            return projected_crs(text).to_wkt()
-    if given is not None and given.crs:
-        return projected_crs(given.crs).to_wkt()
-    raise InputError("The survey has no CRS, for its photographs have no positions, and there are no GCPs: give CRS and GCPS.")
 
 
 def _fingerprint(request: Request, inputs: Inputs, oriented: str) -> str:
@@ -292,7 +221,7 @@ def _result(request: Request, solution: Solution, inputs: Inputs, block: Block) 
 
 def _doming(solution: Solution, inputs: Inputs, checks: NDArray[np.bool_], block: Block) -> Doming | None:
     """Test for a dome on check and leave-one-out errors, or with too few of them on GNSS heights."""
-    limit = georeport.ground_pixel(block, solution.fit.similarity.scale)
+    limit = ground_pixel(block, solution.fit.similarity.scale)
     left = np.isfinite(solution.loo[:, 0])
     places = np.array([s.point.coordinates for s in solution.seen], float).reshape(-1, 3)[:, :2]
     errors = np.where(left, solution.loo[:, 2], solution.errors[:, 2])

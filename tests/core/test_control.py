@@ -6,7 +6,8 @@ import shapely
 from pyproj import Transformer
 from strandline.core.contract import VectorSource
 from strandline.core.errors import InputError
-from strandline.core.orientation.control import Given, Mark, control_from, given_from_layers, in_metres, match_photograph
+from strandline.core.orientation.control import Given, control_from, given_from_layers, in_metres
+from strandline.core.orientation.marks import Mark, match_photograph
 from strandline.core.survey import Photograph
 from strandline.core.vector import write_layer
 
@@ -42,7 +43,7 @@ def test_layer_and_table(tmp_path):
     assert read.coordinates == pytest.approx(PLACES[:2])
     found = control_from(read, UTM, PHOTOS, sigma_h=0.01, sigma_v=0.02)
     assert [(p.name, p.check, p.sigma_h, p.sigma_v) for p in found.points] == [("A", True, 0.5, 0.02), ("B", False, 0.01, 0.02)]
-    assert found.points[0].marks == (Mark("a", "DJI_0001.JPG", 10.25, 20.0),)  # pixels from the corner: as they are
+    assert found.points[0].marks == (Mark("A", "DJI_0001.JPG", 10.25, 20.0),)  # pixels from the corner: as they are
     with pytest.raises(InputError, match="B of gcps has no complete coordinates"):
         control_from(
             given_from_layers(points, None, name_field="Name", height_field="H"), UTM, PHOTOS, sigma_h=0.01, sigma_v=0.02

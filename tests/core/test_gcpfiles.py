@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from strandline.core.errors import InputError
-from strandline.core.orientation.control import Mark, control_from
+from strandline.core.orientation.control import control_from
 from strandline.core.orientation.gcpfiles import read_gcp_file
+from strandline.core.orientation.marks import Mark
 from strandline.core.survey import Photograph
 
 ODM = """EPSG:32611

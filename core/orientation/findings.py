@@ -1,0 +1,149 @@
+"""What ``georeference`` tells the analyst, in sentences."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..block import Block
+from .accuracy import Doming
+from .blunders import Blunder
+from .observations import Seen
+from .solution import Solution
+
+if TYPE_CHECKING:
+    from .georeference import Result
+    from .inputs import Inputs
+
+_EDGE_WARNING = 3.0  # times the sigma in the middle of the block
+_NARROW = np.radians(2.0)
+_LEVELS_DIFFER = 5.0  # m; geoids lie tens of metres from the ellipsoid
+
+
+def verdict(solution: Solution, result: Result) -> str:
+    """Return one sentence for the analyst."""
+    counts = []
+    if result.control_count:
+        counts.append(f"{result.control_count} control points")
+    if "GNSS" in solution.based_on:
+        counts.append(f"the GNSS positions of {len(solution.gnss_errors)} photographs")
+    text = f"Georeferenced by a similarity on {' and '.join(counts)}"
+    if result.plani_check is not None:
+        text += f"; {result.check_count} check points differ by {_pair(result.plani_check, result.alti_check)}"
+    elif result.plani_loo is not None:
+        text += f"; left out one by one, the control points differ by {_pair(result.plani_loo, result.alti_loo)}"
+    elif result.plani_control is not None:
+        text += f"; the control points themselves differ by {_pair(result.plani_control, result.alti_control)}"
+    elif result.plani_gnss is not None:
+        text += f"; they differ by {_pair(result.plani_gnss, result.alti_gnss)}, and no independent point checks the result"
+    if solution.blunders:
+        text += f"; suspicious: {', '.join(dict.fromkeys(b.name for b in solution.blunders))}"
+    return text + "."
+
+
+def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | None) -> list[str]:
+    """Return what the analyst must know before using the result, a sentence each."""
+    told = list(inputs.warnings)
+    told += [_blunder_sentence(b, solution.seen) for b in solution.blunders]
+    told += [
+        f"The GNSS position of {b.name} is off by {b.error:.3g} m in {_where(b)}, {b.ratio:.1f} times its sigma: "
+        "it has little weight."
+        for b in solution.gnss_blunders
+    ]
+    for seen in solution.seen:
+        name = seen.point.name
+        if seen.found is None:
+            few = f"it has {seen.marks} mark{'s' * (seen.marks != 1)} in oriented photographs, and needs two"
+            told.append(f"{name} is not used: {few if seen.marks < 2 else 'its marks do not meet in a point; check them'}.")
+            continue
+        if seen.wrong:
+            told.append(f"The mark of {name} in {', '.join(seen.wrong)} contradicts its other marks and is left out: check it.")
+        elif not seen.found.agree:
+            worst = float(np.linalg.norm(seen.found.residuals, axis=1).max())
+            told.append(f"The marks of {name} do not agree with each other (up to {worst:.1f} px): check them.")
+        if seen.found.angle < _NARROW:
+            degrees = np.degrees(seen.found.angle)
+            told.append(f"The rays to {name} meet at {degrees:.1f} degrees only, which leaves its height uncertain.")
+    told += _factor_sentences(solution)
+    middle, edge = predicted(solution, block)
+    if max(edge[0] / middle[0], edge[1] / middle[1]) > _EDGE_WARNING:
+        told.append(
+            f"The georeferencing is weak away from its points: sigma at the edge of the block is {_pair(*edge)}, in its "
+            f"middle {_pair(*middle)}; put control near the edges."
+        )
+    if solution.height_doubt > 0:
+        told.append(
+            "Without control points heights rest on the focal length, which vertical views of flat ground hardly determine: a "
+            f"doubt of {_metres(solution.height_doubt)} is added; one control point or tilted photographs remove it."
+        )
+    if solution.based_on == "GNSS" and not inputs.gnss.declared:
+        told.append(
+            "The photographs' GNSS carries no sigma: the whole block may be shifted by metres (more in height), which no "
+            "residual shows; without control points do not compare it with another date before co-registration."
+        )
+    level = float(np.mean(solution.gnss_errors[:, 2])) if len(inputs.gnss) and solution.based_on != "GNSS" else 0.0
+    if abs(level) > _LEVELS_DIFFER and inputs.heights.comparable:
+        told.append(
+            f"GNSS heights are {-level:+.1f} m off the block's on average: they may be heights of another kind (see "
+            "GCP_HEIGHTS, GNSS_HEIGHTS and GEOID)."
+        )
+    if dome is not None and dome.significant:
+        told.append(
+            f"Height errors form a dome of {dome.amplitude:+.3g} m (sigma {dome.sigma:.2g} m) from the middle to the outermost "
+            "point: the camera's distortion is not well determined."
+        )
+    return told
+
+
+def predicted(solution: Solution, block: Block) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the georeferencing's predicted sigmas (plan, height; m) in the middle and at the worst corner of the block."""
+    ground = solution.fit.similarity.apply(block.points)
+    low, high = np.percentile(ground, [2, 98], axis=0)
+    middle = np.median(ground, axis=0)
+    corners = np.array([[x, y, middle[2]] for x in (low[0], high[0]) for y in (low[1], high[1])])
+    covariance = solution.fit.uncertainty(np.concatenate([middle[None], corners]))
+    plan = np.sqrt(covariance[:, 0, 0] + covariance[:, 1, 1])
+    height = np.sqrt(covariance[:, 2, 2])
+    return (float(plan[0]), float(height[0])), (float(plan[1:].max()), float(height[1:].max()))
+
+
+def ground_pixel(block: Block, scale: float) -> float:
+    """Return the median size of a pixel on the ground (m)."""
+    sizes = []
+    for index, view in enumerate(block.views):
+        points = block.points[block.observed_point[block.observed_view == index]]
+        if len(points):
+            depth = np.median(points @ view.rotation[2] + view.translation[2])
+            sizes.append(scale * float(depth) / view.camera.brown()[0])
+    return float(np.median(sizes))
+
+
+def _factor_sentences(solution: Solution) -> list[str]:
+    factor = solution.fit.estimated_factor
+    if solution.based_on == "GNSS" or factor is None or factor < 9.0:
+        return []
+    return [
+        f"The control points fit {np.sqrt(factor):.0f} times worse than their sigmas say: these are too small, or the block is "
+        "bent; the predicted sigmas follow the fit, not the sigmas given."
+    ]
+
+
+def _blunder_sentence(blunder: Blunder, seen: tuple[Seen, ...]) -> str:
+    check = any(s.point.name == blunder.name and s.point.check for s in seen)
+    text = f"{blunder.name} is off by {blunder.error:.3g} m in {_where(blunder)}, {blunder.ratio:.1f} times its predicted sigma: "
+    return text + (
+        "check its coordinates and marks." if check else "it is kept with next to no weight; check its coordinates and marks."
+    )
+
+
+def _where(blunder: Blunder) -> str:
+    return "plan" if blunder.part == "plan" else "height"
+
+
+def _pair(plan: float | None, height: float | None) -> str:
+    return f"{_metres(plan)} in plan" + ("" if height is None else f" and {_metres(height)} in height")
+
+
+def _metres(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f} m" if abs(value) < 1 else f"{value:.2f} m"
