@@ -95,7 +95,8 @@ def folder(key: str, label: str, text: str, *, optional: bool = False) -> _Param
 def file(key: str, label: str, text: str) -> _Parameter:
     """Return an optional existing file."""
     kind = QgsProcessingParameterFile.Behavior.File
-    return explained(QgsProcessingParameterFile(key, label, kind, "", None, True), text)
+    # QGIS's own filter, *.*, refuses names without a dot, such as python3.
+    return explained(QgsProcessingParameterFile(key, label, kind, "", None, True, tr("All files (*)")), text)
 
 
 def crs(key: str, label: str, text: str) -> _Parameter:

@@ -42,7 +42,11 @@ class SimulateSurvey(StepAlgorithm):
         )
         yield ask.number("SIDE_OVERLAP", tr("Side overlap (%)"), tr("Of one strip with the next."), default=70.0, most=98.0)
         yield ask.number(
-            "TILT", tr("Tilt (degrees)"), tr("Standard deviation of the camera's lean from the plumb line."), default=3.0, most=60.0
+            "TILT",
+            tr("Tilt (degrees)"),
+            tr("Standard deviation of the camera's lean from the plumb line."),
+            default=3.0,
+            most=60.0,
         )
         yield ask.integer("CAMERA_WIDTH", tr("Image width (px)"), tr("Pixels across."), default=1600, least=64)
         yield ask.integer("CAMERA_HEIGHT", tr("Image height (px)"), tr("Pixels down."), default=1200, least=64)

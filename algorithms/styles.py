@@ -88,14 +88,14 @@ def _difference(layer: QgsRasterLayer) -> None:
 
 
 def _arrows(layer: QgsVectorLayer) -> None:
-    """Draw a dot per point and an arrow for its residual in plan (fields dx, dy), the longest a centimetre long."""
-    places = [layer.fields().lookupField(name) for name in ("dx", "dy")]
+    """Draw a dot per point and an arrow for its residual in plan (fields dE, dN), the longest a centimetre long."""
+    places = [layer.fields().lookupField(name) for name in ("dE", "dN")]
     if min(places) < 0:
         return
     longest = max((math.hypot(*lengths) for lengths in _pairs(layer, places)), default=0.0)
     arrow = QgsVectorFieldSymbolLayer()
-    arrow.setXAttribute("dx")
-    arrow.setYAttribute("dy")
+    arrow.setXAttribute("dE")
+    arrow.setYAttribute("dN")
     arrow.setScale(_LONGEST / longest if longest > 0.0 else 1.0)
     arrow.setColor(QColor("#b2182b"))
     symbol = QgsMarkerSymbol.createSimple({"name": "circle", "color": "#222222", "size": "1.6"})

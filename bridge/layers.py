@@ -1,7 +1,7 @@
 """Layers on their way through the door: to a GeoPackage the engine reads, from one it wrote."""
 
 from pathlib import Path
-from typing import Any, Dict, Iterable, List, Optional
+from typing import Any, Dict, List, Optional
 
 from osgeo import ogr
 from qgis.core import (
@@ -121,7 +121,8 @@ def _write(path: Path, layer: str, names: List[str], features: List[Any]) -> Non
     options = [f"FID={_ID}", "GEOMETRY_NAME=strandline_geometry", "SPATIAL_INDEX=NO"]
     table = data.CreateLayer(layer, None, ogr.wkbUnknown if spatial else ogr.wkbNone, options)
     for column, name in enumerate(names):
-        if table.CreateField(ogr.FieldDefn(name, _field_type(row[column] for _, _, row in features))) != 0:
+        taken = {other.casefold() for other in (_ID, *names[:column])}  # SQLite's names do not tell case
+        if name.casefold() in taken or table.CreateField(_field(name, [row[column] for _, _, row in features])):
             raise LayerError(tr("The field {} of {} cannot be handed to the engine: rename it.").format(name, layer))
     definition = table.GetLayerDefn()
     data.StartTransaction()
@@ -147,8 +148,8 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, (bool, int, float, str)) else str(value)
 
 
-def _field_type(values: Iterable[Any]) -> int:
+def _field(name: str, values: List[Any]) -> ogr.FieldDefn:
     kinds = {type(v) for v in values if v is not None}
     if kinds and kinds <= {bool, int}:
-        return int(ogr.OFTInteger64)
-    return int(ogr.OFTReal if kinds and kinds <= {bool, int, float} else ogr.OFTString)
+        return ogr.FieldDefn(name, ogr.OFTInteger64)
+    return ogr.FieldDefn(name, ogr.OFTReal if kinds and kinds <= {bool, int, float} else ogr.OFTString)

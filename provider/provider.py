@@ -1,6 +1,6 @@
 """The Processing provider ``strandline``."""
 
-from qgis.core import QgsProcessingProvider
+from qgis.core import QgsProcessingModelAlgorithm, QgsProcessingProvider
 from qgis.PyQt.QtGui import QIcon
 
 from ..algorithms import ALGORITHMS
@@ -27,6 +27,11 @@ class StrandlineProvider(QgsProcessingProvider):
         return str(ROOT / "icon.svg")
 
     def loadAlgorithms(self) -> None:
-        """Add the algorithms."""
+        """Add the algorithms and the ready models."""
         for algorithm in ALGORITHMS:
             self.addAlgorithm(algorithm())
+        # A model finds its steps when it runs: they are not registered before this returns.
+        for path in sorted((ROOT / "models").glob("*.model3")):
+            model = QgsProcessingModelAlgorithm()
+            if model.fromFile(str(path)):
+                self.addAlgorithm(model)

@@ -96,19 +96,19 @@ class Feedback:
         self.infos, self.warnings, self.errors, self.progress = [], [], [], []
         self.cancelled = False
 
-    def isCanceled(self):
+    def isCanceled(self):  # noqa: N802
         return self.cancelled
 
-    def setProgress(self, value):
+    def setProgress(self, value):  # noqa: N802
         self.progress.append(value)
 
-    def pushInfo(self, text):
+    def pushInfo(self, text):  # noqa: N802
         self.infos.append(text)
 
-    def pushWarning(self, text):
+    def pushWarning(self, text):  # noqa: N802
         self.warnings.append(text)
 
-    def reportError(self, text, fatal=False):
+    def reportError(self, text, fatal=False):  # noqa: N802
         self.errors.append(text)
 
 

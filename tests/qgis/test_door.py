@@ -40,8 +40,10 @@ def wait_until(true, seconds):
 
 def children():
     """The children of this process, zombies included."""
-    told = subprocess.run(["ps", "-o", "pid=,stat=,comm=", "--ppid", str(os.getpid())], capture_output=True, text=True, check=False)
-    return [line for line in told.stdout.splitlines() if not line.split()[2] == "ps"]
+    told = subprocess.run(
+        ["ps", "-o", "pid=,stat=,comm=", "--ppid", str(os.getpid())], capture_output=True, text=True, check=False
+    )
+    return [line for line in told.stdout.splitlines() if line.split()[2] != "ps"]
 
 
 def test_the_environment_is_cleaned_of_what_qgis_set():
@@ -51,11 +53,11 @@ def test_the_environment_is_cleaned_of_what_qgis_set():
         "PROJ_LIB": "/qgis/proj", "PROJ_DATA": "/qgis/proj", "GDAL_DATA": "/qgis/gdal", "GDAL_DRIVER_PATH": "/qgis",
         "PYTHONPATH": "/qgis/python", "PYTHONHOME": "/qgis", "LD_LIBRARY_PATH": "/qgis/lib", "QT_PLUGIN_PATH": "/qgis/qt",
         "QT_QPA_PLATFORM": "offscreen", "SSL_CERT_FILE": "/qgis/cert.pem", "OSGEO4W_ROOT": "C:\\QGIS",
-        "HTTPS_PROXY": "http://proxy:3128", "no_proxy": "localhost", "HOME": "/home/anna", "TMPDIR": "/big", "LANG": "fr_FR.UTF-8",
+        "HTTPS_PROXY": "http://proxy:3128", "no_proxy": "localhost", "HOME": "/home/anna", "TMPDIR": "/big", "LANG": "fr",
         "PATH": "/usr/local/bin:/usr/bin",
     }  # fmt: skip
     assert cleaned(given) == {
-        "HTTPS_PROXY": "http://proxy:3128", "no_proxy": "localhost", "HOME": "/home/anna", "TMPDIR": "/big", "LANG": "fr_FR.UTF-8",
+        "HTTPS_PROXY": "http://proxy:3128", "no_proxy": "localhost", "HOME": "/home/anna", "TMPDIR": "/big", "LANG": "fr",
         "PATH": "/usr/local/bin:/usr/bin",
     }  # fmt: skip
 
@@ -165,7 +167,8 @@ def test_a_python_that_does_not_start_is_named(door, feedback, tmp_path):
 
 
 FAMILY = """
-    grandchild = subprocess.Popen([sys.executable, "-c", "import signal, time; signal.signal(15, signal.SIG_IGN); time.sleep(600)"])
+    grandchild = subprocess.Popen([sys.executable, "-c",
+        "import signal, time; signal.signal(15, signal.SIG_IGN); time.sleep(600)"])
     say(type="message", level="info", text=f"{os.getpid()} {grandchild.pid}")
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     time.sleep(600)
