@@ -62,12 +62,13 @@ class Qgis:
         key = hashlib.sha256(f"{step} {sorted(parameters.items())} {digest(*inputs)} {self._engine}".encode()).hexdigest()
         memory = json.loads(self._memory.read_text()) if self._memory.is_file() else {}
         made = [str(value) for value in parameters.values() if str(value).endswith((".tif", ".gpkg", ".html"))]
-        known = memory.get(parameters["OUTPUT"])
+        output = str(parameters["OUTPUT"])
+        known = memory.get(output)
         if known and known["key"] == key and all(Path(path).is_file() for path in made):
             print(f"  {step:<15}  stands")
             return dict(known["results"])
         results = self.run(step, **parameters)
-        memory[parameters["OUTPUT"]] = {"key": key, "results": results}
+        memory[output] = {"key": key, "results": results}
         self._memory.write_text(json.dumps(memory, indent=1))
         return results
 

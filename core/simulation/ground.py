@@ -38,7 +38,7 @@ class Targets:
 
 
 def lay_targets(beach: Beach, after: bool, control: int, check: int, side: float, random: np.random.Generator) -> Targets:
-    """Lay targets of ``side`` metres, spread as widely as the ground allows: the control first, check points in the gaps.
+    """Lay targets of ``side`` metres: the first in the corners, each further one where the widest gap is; control first.
 
     Raises
     ------
@@ -55,11 +55,12 @@ def lay_targets(beach: Beach, after: bool, control: int, check: int, side: float
     z = beach.heights(around[..., 0], around[..., 1], after)
     slope = np.hypot(z[1] - z[2], z[3] - z[4]) / (2 * side)
     places = places[(slope < _STEEPEST) & (z.min(axis=0) > 0.05)]
-    distance = np.hypot(*(places - (margin, margin)).T)  # the first lies in a corner
+    corners = np.array([[0, 0], [1, 1], [1, 0], [0, 1]]) * (beach.length, beach.width)
     nearest, chosen = np.full(len(places), np.inf), []
     for k in range(count):
-        best = int(np.argmin(distance)) if k == 0 else int(np.argmax(nearest))
-        if not len(places) or nearest[best] < 3 * side:
+        wanted = -np.hypot(*(places - corners[k]).T) if k < len(corners) else nearest
+        best = int(np.argmax(wanted)) if len(places) else -1
+        if best < 0 or nearest[best] < 3 * side:
             raise InputError(f"The area has no room for {count} targets of {side:.1f} m: ask for fewer, or enlarge the area.")
         chosen.append(best)
         nearest = np.minimum(nearest, np.hypot(*(places - places[best]).T))
