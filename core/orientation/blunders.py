@@ -14,6 +14,7 @@ from .similarity import Fit
 
 Array = NDArray[np.float64]
 
+TOO_FEW_TO_TELL = 4  # control points: a twist of four corners fits an error at any of them
 _BLUNDER = 0.01  # probability that a clean set of points has one named
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from ..block import Block
 from .accuracy import Doming
-from .blunders import Blunder
+from .blunders import TOO_FEW_TO_TELL, Blunder
 from .observations import Seen
-from .solution import Solution
+from .solution import FOCAL_ASTRAY, Solution
 
 if TYPE_CHECKING:
     from .georeference import Result
@@ -72,7 +72,12 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
             f"The georeferencing is weak away from its points: sigma at the edge of the block is {_pair(*edge)}, in its "
             f"middle {_pair(*middle)}; put control near the edges."
         )
-    if solution.height_doubt > 0:
+    if solution.height_doubt > 0 and abs(inputs.focal_change) > FOCAL_ASTRAY:
+        told.append(
+            f"The orientation changed the focal length by {100 * inputs.focal_change:+.0f} %, and without control points "
+            f"heights rest on it: they may be off by {_metres(solution.height_doubt)}; give a control point, or a calibration to orient."
+        )
+    elif solution.height_doubt > 0:
         told.append(
             "Without control points heights rest on the focal length, which vertical views of flat ground hardly determine: a "
             f"doubt of {_metres(solution.height_doubt)} is added; one control point or tilted photographs remove it."
@@ -131,10 +136,13 @@ def _factor_sentences(solution: Solution) -> list[str]:
 
 def _blunder_sentence(blunder: Blunder, seen: tuple[Seen, ...]) -> str:
     check = any(s.point.name == blunder.name and s.point.check for s in seen)
+    control = sum(not s.point.check and s.found is not None for s in seen)
     text = f"{blunder.name} is off by {blunder.error:.3g} m in {_where(blunder)}, {blunder.ratio:.1f} times its predicted sigma: "
-    return text + (
-        "check its coordinates and marks." if check else "it is kept with next to no weight; check its coordinates and marks."
-    )
+    if check:
+        return text + "check its coordinates and marks."
+    if control <= TOO_FEW_TO_TELL:
+        return text + f"with {control} control points it could be another of them; check the coordinates and marks of all."
+    return text + "it is kept with next to no weight; check its coordinates and marks."
 
 
 def _where(blunder: Blunder) -> str:

@@ -183,7 +183,7 @@ def _solve(block: Block, inputs: Inputs, sigma_mark: float) -> Solution:
     # The origin belongs in the middle of the block, wherever the control lies; to whole metres, so that it stays put.
     middle = first.to_crs(np.median(rough.apply(block.points), axis=0)[None])[0]
     frame = LocalFrame.at(inputs.crs, *map(float, np.round(middle)))
-    return solve(block, seen, inputs.gnss, frame=frame, comparable=inputs.heights.comparable)
+    return solve(block, seen, inputs.gnss, frame=frame, comparable=inputs.heights.comparable, focal_change=inputs.focal_change)
 
 
 def _enough(seen: Sequence[Seen], inputs: Inputs) -> None:

@@ -23,12 +23,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Inputs:
-    """All that the user gave, read, checked and in the survey's CRS (WKT2)."""
+    """All that the user gave, read, checked and in the survey's CRS (WKT2).
+
+    ``focal_change`` is the oriented focal length over the photographs' own, minus 1 (median); 0 when the files do not tell.
+    """
 
     crs: str
     control: Control
     gnss: Gnss
     heights: HeightPlan
+    focal_change: float
     warnings: tuple[str, ...]
 
 
@@ -92,7 +96,13 @@ def gather(request: Request, survey: Survey, given: Given | None, block: Block) 
     if request.ignore is not None:
         polygons(request.ignore, crs)
         warnings.append("IGNORE has no effect on a similarity, which uses no tie points.")
-    return Inputs(crs, control, gnss, plan, tuple(warnings))
+    return Inputs(crs, control, gnss, plan, _focal_change(survey, block), tuple(warnings))
+
+
+def _focal_change(survey: Survey, block: Block) -> float:
+    known = {p.name: p.focal for p in survey.photographs}
+    changes = [v.camera.brown()[0] / focal - 1.0 for v in block.views if (focal := known.get(v.name))]
+    return float(np.median(changes)) if changes else 0.0
 
 
 def _crs(request: Request, survey: Survey, given: Given | None) -> str:

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from ..block import Block
 from ..errors import InputError, NotEnoughData
 from ..frames import LocalFrame
-from .blunders import Blunder, distrust, wrong_checks, wrong_control, wrong_positions
+from .blunders import TOO_FEW_TO_TELL, Blunder, distrust, wrong_checks, wrong_control, wrong_positions
 from .gnss import Gnss
 from .observations import Seen, Solver, undetermined
 from .similarity import Fit, Similarity
 
 Array = NDArray[np.float64]
+
+FOCAL_ASTRAY = 0.05  # focal lengths in EXIF are good to a few per cent
 
 
 @dataclass(frozen=True)
@@ -47,8 +49,19 @@ def place(block: Block, seen: tuple[Seen, ...], gnss: Gnss, frame: LocalFrame) -
     return _choose(Solver(block, seen, gnss, frame), used)[1].similarity
 
 
-def solve(block: Block, seen: tuple[Seen, ...], gnss: Gnss, *, frame: LocalFrame, comparable: bool) -> Solution:
+def solve(
+    block: Block,
+    seen: tuple[Seen, ...],
+    gnss: Gnss,
+    *,
+    frame: LocalFrame,
+    comparable: bool,
+    focal_change: float = 0.0,
+) -> Solution:
     """Fit the similarity on the control points; on GNSS too when these do not suffice; on GNSS alone without any.
+
+    ``comparable`` tells whether GNSS and GCP heights are of one kind, ``focal_change`` how much of itself the focal length was
+    changed by the orientation.
 
     Raises
     ------
@@ -66,7 +79,7 @@ def solve(block: Block, seen: tuple[Seen, ...], gnss: Gnss, *, frame: LocalFrame
     with_gnss, solved = _choose(solver, used)
     solver.with_gnss = with_gnss
     blunders = wrong_control(solver, used, solved)
-    if blunders:
+    if blunders and used.sum() > TOO_FEW_TO_TELL:
         distrust(solver, blunders)
         solved = solver.fit(used)
     _look_down(block, solved)
@@ -75,7 +88,7 @@ def solve(block: Block, seen: tuple[Seen, ...], gnss: Gnss, *, frame: LocalFrame
     based = "GNSS" if not used.any() else "control and GNSS" if with_gnss else "control"
     gnss_errors = solver.gnss_errors(solved)
     suspicious = wrong_positions(solver, solved) if with_gnss else []
-    doubt = 0.0 if used.any() else _height_doubt(block, solved)
+    doubt = 0.0 if used.any() else _height_doubt(block, solved, focal_change)
     errors = solver.errors(solved)
     if doubt > 0:
         covariance = solved.covariance.copy()
@@ -139,11 +152,12 @@ def _look_down(block: Block, solved: Fit) -> None:
         )
 
 
-def _height_doubt(block: Block, solved: Fit) -> float:
+def _height_doubt(block: Block, solved: Fit, focal_change: float) -> float:
     """Return the sigma (m) that an uncertain focal length gives to heights below cameras held by GNSS; 0 where views tilt.
 
     Vertical views from one height over flat ground trade focal length for depth. A simulation of 28 photographs, RTK and 12,000
-    tie points gave 0.4 % of the height with half a degree of tilt and next to no relief, 0.1 % with two degrees and some.
+    tie points gave 0.4 % of the height with half a degree of tilt and next to no relief, 0.1 % with two degrees and some. A focal
+    length far from the files' own says that it went astray, and by how much.
     """
     looks = np.array([solved.similarity.rotation @ v.rotation.T @ [0.0, 0.0, 1.0] for v in block.views])
     tilt = float(np.sqrt(np.mean(np.arccos(np.clip(-looks[:, 2], -1.0, 1.0)) ** 2)))
@@ -152,6 +166,8 @@ def _height_doubt(block: Block, solved: Fit) -> float:
     height = float(np.median(centres) - np.median(ground))
     relief = float(np.hypot(np.std(centres), np.subtract(*np.percentile(ground, [84, 16])) / 2)) / height
     strength = max(tilt / np.radians(2.0), relief / 0.02)  # 1 where the simulation said 0.1 %
+    if abs(focal_change) > FOCAL_ASTRAY:
+        return height * abs(focal_change)
     return 0.0 if strength > 5.0 else height * min(0.004, 0.001 / strength)
 
 

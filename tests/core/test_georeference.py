@@ -395,6 +395,17 @@ def test_gnss_alone(tmp_path):
     assert "may be shifted by metres" in scene.report()
 
 
+def test_a_focal_length_gone_astray_is_called_out(tmp_path):
+    scene = Scene(tmp_path, gnss_sigma=0.03)
+    photographs = [replace(p, focal=2500.0) for p in scene.survey.photographs]
+    survey = Survey.create(tmp_path / "survey", tmp_path, scene.survey.crs, photographs)
+    survey.finish("orient", "1", built_on=(), parameters={}, result={})
+    run(scene.request([], gnss=True))
+    assert "changed the focal length by +20 %" in scene.report()
+    covariance = np.reshape(Georef.read(Survey.open(tmp_path / "survey")).covariance, (7, 7))
+    assert np.sqrt(covariance[2, 2]) == pytest.approx(0.2 * HEIGHT, rel=0.1)
+
+
 def test_a_wrong_position_is_named(tmp_path):
     scene = Scene(tmp_path, gnss_noise=0.1)
     photographs = list(scene.survey.photographs)
