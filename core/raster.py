@@ -249,7 +249,6 @@ class CogWriter:
         self._whole.__exit__(kind, error, trace)
 
     def _finish(self) -> None:
-        floating = self._dtype == "float32"
         rasterio.shutil.copy(
             self._raw,
             self._part,
@@ -260,7 +259,6 @@ class CogWriter:
             overview_resampling="average",
             bigtiff="if_safer",
             num_threads=1,
-            **({"nodata": NODATA} if floating else {}),
         )
 
 

@@ -63,6 +63,8 @@ class Aligned:
         if (high <= low).any():
             return out
         values = self.heights.read(int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1]))
+        if np.isnan(values).all():
+            return out
         _sample(values, source - low, _STEP, self.points, out)
         return out
 

@@ -63,6 +63,8 @@ class Pair:
     def change(self, window: Grid) -> tuple[Array, Array]:
         """Return after minus before and before (rows, columns) on a window."""
         before = self.before.read(window)
+        if np.isnan(before).all():
+            return before.copy(), before
         change = self.after.read(window) - before
         if self.ignore:
             change[touched(self.ignore, window)] = np.nan
@@ -151,6 +153,9 @@ def difference(
         for column, row, width, height in progress.over(pair.tiles(halo)):
             around, inner = _with_halo(grid, column, row, width, height, halo)
             change, before = pair.change(around)
+            _thin(outcome.height, thinning, column, row, before[inner])
+            if np.isnan(change[inner]).all():
+                continue  # the files begin without data
             change = change - _shift_on(shift, around)
             spread = kept = None
             if sigma is not None:
@@ -170,7 +175,10 @@ def difference(
                 found = cell_shares(shapes[i], window)
                 if found is not None:
                     outcome.tallies[i].add(tile, *found)
-            _count(outcome, column, row, change, before)
+            _thin(outcome.change, thinning, column, row, change)
+            known = np.isfinite(change)
+            outcome.valid += int(np.count_nonzero(known))
+            outcome.moved += int(np.count_nonzero(known & (change != 0)))
         if outcome.valid == 0:
             raise NotEnoughData("BEFORE and AFTER have no cell where both have a height: choose rasters whose data overlap.")
     return outcome
@@ -197,17 +205,8 @@ def _shift_on(shift: Shift, window: Grid) -> Array:
     return shift.at(x[None, :], y[:, None])
 
 
-def _count(outcome: Outcome, column: int, row: int, change: Array, before: Array) -> None:
-    known = np.isfinite(change)
-    outcome.valid += int(np.count_nonzero(known))
-    outcome.moved += int(np.count_nonzero(known & (change != 0)))
-    step = outcome.thinning
+def _thin(map_: Array, step: int, column: int, row: int, values: Array) -> None:
+    """Put every ``step``-th cell of a tile that begins at ``column``, ``row`` into the thinned map."""
     r, c = (-row) % step, (-column) % step
-    part = change[r::step, c::step]
-    if part.size:
-        at = (
-            slice((row + r) // step, (row + r) // step + part.shape[0]),
-            slice((column + c) // step, (column + c) // step + part.shape[1]),
-        )
-        outcome.change[at] = part
-        outcome.height[at] = before[r::step, c::step]
+    part = values[r::step, c::step]
+    map_[(row + r) // step :, (column + c) // step :][: part.shape[0], : part.shape[1]] = part

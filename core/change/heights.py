@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from ..contract import RasterSource
@@ -63,26 +64,18 @@ class Heights:
         return (stored * self.file.scale + self.file.offset) * self.units.vertical
 
 
-@dataclass
-class _Extremes:
-    """The two lowest and two highest distinct values seen, and how often the outer ones and zero came."""
+class _Extremes(NamedTuple):
+    """The two lowest and two highest distinct stored values, how often the outer ones and zero came, cells and sum of squares."""
 
     low: float = np.inf
     second_low: float = np.inf
-    low_count: int = 0
+    low_count: float = 0.0
     high: float = -np.inf
     second_high: float = -np.inf
-    high_count: int = 0
-    zeros: int = 0
-    count: int = 0
-    square: float = 0.0
-
-    def add(self, values: Array) -> None:
-        self.count += len(values)
-        self.zeros += int(np.count_nonzero(values == 0.0))
-        self.low, self.second_low, self.low_count = _outer(values, self.low, self.second_low, self.low_count)
-        high, second, self.high_count = _outer(-values, -self.high, -self.second_high, self.high_count)
-        self.high, self.second_high = -high, -second
+    high_count: float = 0.0
+    zeros: float = 0.0
+    cells: float = 0.0
+    squares: float = 0.0  # of metres
 
 
 def open_heights(source: RasterSource, label: str, nodata: float | None, progress: Progress) -> Heights:
@@ -120,12 +113,12 @@ def open_heights(source: RasterSource, label: str, nodata: float | None, progres
             f"{label}: the value {found:.9g} is far outside the other heights and is treated as no data; declare it with NODATA."
         )
         heights = replace(heights, nodata=(*heights.nodata, found))
-    if not seen.count:
+    if not seen.cells:
         raise NotEnoughData(f"{label} ({source.path}) has no heights at all: every cell is without data.")
-    if seen.zeros > 0.05 * seen.count and seen.low < seen.high:
-        share = 100.0 * seen.zeros / seen.count
+    if seen.zeros > 0.05 * seen.cells and seen.low < seen.high:
+        share = 100.0 * seen.zeros / seen.cells
         progress.warn(f"{label}: {share:.0f} % of the heights are exactly 0; if that means no data, give NODATA=0.")
-    return replace(heights, mean_square=seen.square / seen.count)
+    return replace(heights, mean_square=seen.squares / seen.cells)
 
 
 def _declared(label: str, file: RasterFile, nodata: float | None, progress: Progress) -> tuple[float, ...]:
@@ -144,33 +137,18 @@ def _as_stored(file: RasterFile, value: float) -> tuple[float, ...]:
 
 
 def _scan(heights: Heights, progress: Progress) -> _Extremes:
-    seen = _Extremes()
+    seen = np.array(_Extremes())
+    nodata = np.array(heights.nodata, float)
+    to_metres = heights.metres(np.array([0.0, 1.0]))
     for block in progress.over(list(_blocks(heights.file))):
-        values = heights.file.read(*block).ravel()
-        values = values[np.isfinite(values)]
-        for value in heights.nodata:
-            values = values[values != value]
-        if len(values):
-            seen.add(values)
-            metres = heights.metres(values)
-            seen.square += float(metres @ metres)
-    return seen
+        _look(heights.file.read(*block), nodata, to_metres[0], to_metres[1] - to_metres[0], seen)
+    return _Extremes(*seen.tolist())
 
 
 def _blocks(file: RasterFile) -> Iterator[tuple[int, int, int, int]]:
     rows = max(1, _CELLS // file.width)
     for row in range(0, file.height, rows):
         yield 0, row, file.width, min(rows, file.height - row)
-
-
-def _outer(values: Array, lowest: float, second: float, count: int) -> tuple[float, float, int]:
-    """Return the two lowest distinct values, and the count of the lowest, of ``values`` and of those known before."""
-    low = float(values.min())
-    others = values[values > low]
-    candidates = sorted({low, lowest, second, float(others.min()) if len(others) else np.inf})
-    here = len(values) - len(others)
-    total = (here if low == candidates[0] else 0) + (count if lowest == candidates[0] else 0)
-    return candidates[0], (candidates[1] if len(candidates) > 1 else np.inf), total
 
 
 def _undeclared(seen: _Extremes, metres: float) -> float | None:
@@ -195,3 +173,30 @@ def _undeclared(seen: _Extremes, metres: float) -> float | None:
         if not alone and count >= 10 and gap > 20.0 * rest and gap * metres > 1000.0:
             return value
     return None
+
+
+@njit(cache=True)  # pragma: no cover
+def _look(values: Array, nodata: Array, offset: float, scale: float, seen: Array) -> None:
+    """Update ``seen``, the numbers of _Extremes, by the stored values (rows, columns) that are finite and not ``nodata``."""
+    for value in values.flat:
+        if not np.isfinite(value):
+            continue
+        hidden = False
+        for other in nodata:
+            hidden |= value == other
+        if hidden:
+            continue
+        if value < seen[0]:
+            seen[1], seen[0], seen[2] = seen[0], value, 0.0
+        elif seen[0] < value < seen[1]:
+            seen[1] = value
+        if value > seen[3]:
+            seen[4], seen[3], seen[5] = seen[3], value, 0.0
+        elif seen[4] < value < seen[3]:
+            seen[4] = value
+        seen[2] += value == seen[0]
+        seen[5] += value == seen[3]
+        seen[6] += value == 0.0
+        seen[7] += 1.0
+        metres = offset + scale * value
+        seen[8] += metres * metres

@@ -45,7 +45,7 @@ class Sample:
 
 
 @njit(cache=True)  # pragma: no cover
-def mixed(cell: int) -> int:
+def mixed(cell: int) -> np.uint64:
     """Return a 64-bit hash of a cell's number (splitmix64; Steele, Lea & Flood 2014)."""
     z = np.uint64(cell) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -54,5 +54,5 @@ def mixed(cell: int) -> int:
 
 
 @vectorize(["uint64(int64)"], cache=True)  # pragma: no cover
-def _hashes(cell: int) -> int:
+def _hashes(cell: int) -> np.uint64:
     return mixed(cell)

@@ -117,10 +117,14 @@ def _empirical(
 @njit(cache=True)  # pragma: no cover
 def pair_sum(x: Array, y: Array, left: Array, right: Array, reach: float) -> float:
     """Return the sum over ordered pairs i != k of left_i right_k rho(d_ik), symmetrised; rho as in ``correlation``."""
+    order = np.argsort(x)
+    x, y, left, right = x[order], y[order], left[order], right[order]
     total = 0.0
     for i in range(len(x)):
         for k in range(i + 1, len(x)):
-            h = np.hypot(x[i] - x[k], y[i] - y[k]) / reach
+            if x[k] - x[i] >= reach:
+                break
+            h = np.sqrt((x[i] - x[k]) ** 2 + (y[i] - y[k]) ** 2) / reach
             if h < 1.0:
                 total += (left[i] * right[k] + left[k] * right[i]) * (1.0 - 1.5 * h + 0.5 * h * h * h)
     return total

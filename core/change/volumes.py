@@ -114,8 +114,8 @@ class Tally:
         picked = np.zeros(change.shape, np.uint8)
         first = tile.first + row * tile.stride + column
         _gather(change, sigma, kept, before, shares, first, tile.stride, limits, sums, others, picked)
-        x0, y0 = grid.centres(np.array(row), np.array(column))
-        weight, by_column, by_row, height, down, up, noise = others
+        x0, y0 = (float(v) for v in grid.centres(np.array(row), np.array(column)))
+        weight, by_column, by_row, height, down, up, noise = others.tolist()
         self._place += (weight * x0 + by_column * grid.cell, weight * y0 - by_row * grid.step_north, height)
         self._significant_down += down
         self._significant_up += up
@@ -123,7 +123,7 @@ class Tally:
         if sums[0, 1] > 0:
             self._sigma_known &= bool(np.isfinite(sums[0, 2]))
             self._detected &= tile.significant is not None
-        for bit, (group, (metres, share, squares, count)) in enumerate(zip(groups, sums, strict=True)):
+        for bit, (group, (metres, share, squares, count)) in enumerate(zip(groups, sums.tolist(), strict=True)):
             group.height += metres
             group.weight += share
             group.squares += squares
@@ -169,7 +169,7 @@ def _gather(
     others: Array,
     picked: NDArray[np.uint8],
 ) -> None:
-    """Add cells to sums (all, falling, rising; height, weight, squares, count) and mark those that the samples take (one bit each).
+    """Add cells to sums (all, falling, rising; height, weight, squares, count) and mark those that the samples take, a bit each.
 
     ``others``: weight, weight by column and by row, height before, significant fall and rise, sigma of what is not significant.
     """

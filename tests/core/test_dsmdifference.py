@@ -1,6 +1,8 @@
 """The step as a whole: volumes by hand, every kind of input, and sentences for bad ones."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -147,6 +149,46 @@ class TestVolumesByHand:
         values, _, _ = read_raster(result.significant)
         expected = np.where(np.abs(self.CHANGE) > 0.98, self.CHANGE, np.nan)
         np.testing.assert_array_equal(values, expected)
+
+
+class TestPrecision:
+    """Sigma by cell: 0.1 m in the west, 0.4 m in the east of AFTER."""
+
+    @pytest.fixture
+    def scene(self, make_raster):
+        values = np.add.outer(np.zeros(8), np.arange(10.0))
+        precision = np.where(np.arange(10) < 5, 0.1, 0.4) * np.ones((8, 1))
+        precision[0, 0] = -9999.0
+        pair = make_raster("b", values), make_raster("a", values + 0.5)
+        return pair, {"before_sigma": 0.0, "after_precision": make_raster("p", precision, nodata=-9999.0)}
+
+    def test_cell(self, step, scene, listener):
+        pair, options = scene
+        result = step(*pair, **options)
+        # 1.96 x 0.1 < 0.5 < 1.96 x 0.4; one cell has no precision.
+        assert result.deposition_significant == pytest.approx(39 * 0.5)
+        assert any("1 cells have a change but no precision" in w for w in listener.warnings)
+        assert result.net_random is None
+
+    def test_uniform(self, step, scene):
+        pair, options = scene
+        result = step(*pair, **options, lod="uniform")
+        sigma = np.sqrt((39 * 0.01 + 40 * 0.16) / 79)
+        assert result.net_random == pytest.approx(np.sqrt(80) * sigma)
+        assert result.deposition_significant == pytest.approx(0.0)  # 1.96 x 0.293 m
+
+    def test_where_it_is_known(self, step, scene, make_polygons):
+        pair, options = scene
+        zone = make_polygons("zone", [shapely.box(1, -8, 7, 0)])
+        result = step(*pair, **options, zones=zone, correlation_range=0.0, registration_sigma=0.0)
+        assert result.net_random == pytest.approx(np.sqrt(32 * 0.01 + 16 * 0.16))
+        assert result.net_sigma == result.net_random
+
+    def test_registration_widens_the_level_of_detection(self, step, scene):
+        pair, _ = scene
+        sigma = {"before_sigma": 0.1, "after_sigma": 0.1}
+        assert step(*pair, **sigma, registration_sigma=0.0).deposition_significant == pytest.approx(40.0)
+        assert step(*pair, **sigma, registration_sigma=0.3).deposition_significant == 0.0
 
 
 class TestInputs:
@@ -472,3 +514,65 @@ def test_the_same_again(step, make_raster, read_raster):
     content = Path(first.output).read_bytes()
     assert step(*pair, **options) == first
     assert Path(first.output).read_bytes() == content
+
+
+def test_full_sigma_covers_the_truth(step, make_raster, make_polygons):
+    """Correlated and random noise and a shift: with STABLE alone the interval of the net holds the truth as often as it says."""
+    from strandline.core.change.variogram import correlation
+
+    side, reach, sill, nugget = 128, 10.0, 0.03, 0.02
+    i = np.minimum(np.arange(2 * side), 2 * side - np.arange(2 * side))
+    spectrum = np.sqrt(np.maximum(np.fft.fft2(correlation(np.hypot(i[:, None], i[None]), reach)).real, 0))
+    stable = make_polygons("stable", [shapely.box(0, -128, 128, -64)])
+    zone = make_polygons("zone", [shapely.box(30, -50, 90, -10)])
+    random = np.random.default_rng(8)
+    scores = []
+    for _ in range(40):
+        field = np.fft.ifft2(np.fft.fft2(random.standard_normal((2 * side, 2 * side))) * spectrum).real[:side, :side]
+        after = 0.2 + sill * field + nugget * random.standard_normal((side, side))
+        after[10:50, 30:90] += 0.1
+        pair = make_raster("b", np.zeros((side, side)) + 1e-9), make_raster("a", after)
+        result = step(*pair, stable=stable, zones=zone)
+        scores.append((result.net - 240.0) / result.net_sigma)
+    # 40 runs: a standard deviation of one is met to 11 %, the sill of each run is estimated from 80 patches.
+    assert np.std(scores) == pytest.approx(1.0, abs=0.3)
+    assert abs(np.mean(scores)) < 0.5
+    assert np.mean(np.abs(scores) < 1.96) >= 0.85
+
+
+def test_memory_stays_bounded(make_raster, tmp_path):
+    """8,000 x 8,000 cells, mostly empty: two such arrays of 64-bit numbers alone would be 1 GB."""
+    import rasterio
+    from rasterio.windows import Window
+
+    side, sources = 8_000, []
+    for name, rise in (("b", 0.0), ("a", 0.5)):
+        path = tmp_path / f"{name}.tif"
+        profile = {"driver": "GTiff", "width": side, "height": side, "count": 1, "dtype": "float32", "nodata": -9999.0}
+        profile |= {
+            "tiled": True,
+            "blockxsize": 512,
+            "blockysize": 512,
+            "sparse_ok": True,
+            "crs": "EPSG:32755",
+            "compress": "deflate",
+        }
+        place = rasterio.transform.Affine(0.1, 0, WEST, 0, -0.1, NORTH)
+        with rasterio.open(path, "w", transform=place, **profile) as file:
+            patch = np.add.outer(np.arange(1000.0), np.arange(1000.0)).astype(np.float32)[None] / 1000
+            for corner in (0, 3500, 7000):
+                file.write(patch + np.float32(rise), window=Window(corner, corner, 1000, 1000))
+        sources.append({"path": str(path)})
+    request = tmp_path / "request.json"
+    request.write_text(json.dumps({"before": sources[0], "after": sources[1], "output": str(tmp_path / "o.tif")}))
+    code = (
+        "import resource, sys\nimport strandline.core.change.dsmdifference\nfrom strandline.core.entry import main\n"
+        "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\nstatus = main(['dsmdifference', sys.argv[1]])\n"
+        "print(status, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024, file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(request)], capture_output=True, text=True, check=True)
+    status, grown = done.stderr.split()[-2:]
+    assert status == "0"
+    result = json.loads(done.stdout.splitlines()[-1])["result"]
+    assert result["net"] == pytest.approx(3e6 * 0.01 * 0.5, rel=1e-5)
+    assert float(grown) < 450.0
