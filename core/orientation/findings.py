@@ -74,8 +74,8 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
         )
     if solution.height_doubt > 0 and abs(inputs.focal_change) > FOCAL_ASTRAY:
         told.append(
-            f"The orientation changed the focal length by {100 * inputs.focal_change:+.0f} %, and without control points heights rest "
-            f"on it: they may be off by {_metres(solution.height_doubt)}; give a control point, or a calibration to orient."
+            f"The orientation changed the focal length by {100 * inputs.focal_change:+.0f} %, and without control points heights "
+            f"rest on it: they may be off by {_metres(solution.height_doubt)}; give a control point, or a calibration."
         )
     elif solution.height_doubt > 0:
         told.append(
