@@ -2,7 +2,6 @@
 
 import os
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Dict, Iterable, Optional, Tuple
 
@@ -24,6 +23,8 @@ from ..bridge.request import Values
 from ..i18n import tr
 from . import parameters as ask
 from .base import About, StepAlgorithm
+
+_EXPECTED = 45  # packages, with those they need; only the progress bar hangs on it
 
 
 class CheckEngine(StepAlgorithm):
@@ -89,35 +90,12 @@ class CheckEngine(StepAlgorithm):
     def _install(self, python: Optional[str], wheels: Optional[Path], feedback: QgsProcessingFeedback) -> None:
         base, folder = base_python(python), install_folder()
         feedback.pushInfo(tr("Installing the engine in {} with {}.").format(folder, base))
-        steps = _Steps(feedback)
-        install.make(folder, base, steps.call, wheels=wheels, fresh=python is not None)
-
-
-class _Steps:
-    """Runs the installation's commands, showing what they print and how far they are."""
-
-    _EXPECTED = 45  # packages with what they need; only the progress bar hangs on it
-
-    def __init__(self, feedback: QgsProcessingFeedback) -> None:
-        self._feedback, self._seen = feedback, 0
-
-    def call(self, command: Sequence[str]) -> None:
-        """Run ``command``.
-
-        Raises
-        ------
-        EngineError
-            When it fails.
-        Cancelled
-            When the user asked to stop.
-        """
-        last = ""
-        with Child(command, cleaned(os.environ)) as child:
-            for line in child.lines(self._feedback):
-                self._feedback.pushInfo(line)
+        last, seen = base, 0
+        with Child(install.command(base, folder, wheels=wheels, fresh=python is not None), cleaned(os.environ)) as child:
+            for line in child.lines(feedback):
+                feedback.pushInfo(line)
                 last = line if line.strip() else last
-                self._seen += bool(re.match(r"(Collecting|Processing) ", line))
-                done = 0.95 if line.startswith("Successfully installed") else min(self._seen / self._EXPECTED, 1.0) * 0.8
-                self._feedback.setProgress(100.0 * done)
-            if child.wait(self._feedback) != 0:
-                raise EngineError(tr("The engine could not be installed: {} (see the lines above).").format(last or command[0]))
+                seen += bool(re.match(r"(Collecting|Processing) ", line))
+                feedback.setProgress(95.0 if line.startswith("Successfully installed") else min(80.0, 80.0 * seen / _EXPECTED))
+            if child.wait(feedback) != 0:
+                raise EngineError(tr("The engine could not be installed: {} (see the lines above).").format(last))

@@ -44,7 +44,7 @@ class SimulateSurvey(StepAlgorithm):
         yield ask.number(
             "TILT",
             tr("Tilt (degrees)"),
-            tr("Standard deviation of the camera's lean from the plumb line."),
+            tr("Standard deviation of the camera's lean from plumb."),
             default=3.0,
             most=60.0,
         )

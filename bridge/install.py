@@ -1,21 +1,23 @@
 """Make the engine's environment: a venv with the pinned packages, marked ready only when it is whole.
 
-This file imports the standard library alone: QGIS uses it, and so does ``make setup`` as a script:
+QGIS asks it where a ready engine is. To make one, it runs as a script under the Python that the venv is to have, and so
+it imports the standard library alone:
 
-    python3 bridge/install.py FOLDER [REQUIREMENTS ...]
+    python3 bridge/install.py FOLDER [--requirements FILE ...] [--wheels FOLDER] [--fresh] [--door]
 """
 
+import argparse
 import hashlib
 import os
+import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
-from typing import Callable, List, Optional, Sequence
+from typing import List, Optional, Sequence
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements.txt"
 _MARKER = "strandline-ready"  # written last; holds the fingerprint of the requirements
-
-Call = Callable[[Sequence[str]], None]
 
 
 def python_of(folder: Path) -> Path:
@@ -38,37 +40,73 @@ def state(folder: Path) -> str:
     return "ready" if marker.read_text(encoding="utf-8").strip() == fingerprint() else "outdated"
 
 
-def make(
-    folder: Path, python: str, call: Call, *, more: Sequence[Path] = (), wheels: Optional[Path] = None, fresh: bool = False
-) -> None:
-    """Make or complete the venv ``folder`` with ``python``.
+def command(python: str, folder: Path, *, wheels: Optional[Path] = None, fresh: bool = False) -> List[str]:
+    """Return the command with which the door makes the venv ``folder`` with ``python``."""
+    options = [*(["--wheels", str(wheels)] if wheels else []), *(["--fresh"] if fresh else [])]
+    return [python, "-s", str(Path(__file__).resolve()), str(folder), *options, "--door"]
 
-    ``call`` runs a command and raises when it fails. ``more`` are further requirement files. ``wheels`` is a folder
-    to install from instead of the network. ``fresh`` starts over even when a usable venv stands.
+
+def make(folder: Path, *, more: Sequence[Path] = (), wheels: Optional[Path] = None, fresh: bool = False) -> None:
+    """Make or complete the venv ``folder`` with the running Python.
+
+    ``more`` are further requirement files, ``wheels`` is a folder to install from instead of the network; ``fresh``
+    starts over even when a usable venv stands.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        When venv or pip fails; they have said why.
     """
     (folder / _MARKER).unlink(missing_ok=True)
     inner = str(python_of(folder))
     if fresh or not _works([inner, "-m", "pip", "--version"]):
         folder.parent.mkdir(parents=True, exist_ok=True)
-        call([python, "-m", "venv", "--clear", str(folder)])
+        _call([sys.executable, "-m", "venv", "--clear", str(folder)])
     source = ["--no-index", "--find-links", str(wheels)] if wheels else []
-    files: List[str] = []
-    for path in (REQUIREMENTS, *more):
-        files += ["-r", str(path)]
-    options = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
-    call([inner, "-m", "pip", "install", *options, *source, *files])
+    files = [word for path in (REQUIREMENTS, *more) for word in ("-r", str(path))]
+    _call([inner, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar", "off", *source, *files])
     # The marker appears whole or not at all, and only now.
     part = folder / f"{_MARKER}.part"
     part.write_text(fingerprint() + "\n", encoding="utf-8")
     part.replace(folder / _MARKER)
 
 
-def _works(command: Sequence[str]) -> bool:
+def main() -> int:
+    """Run as a script."""
+    parser = argparse.ArgumentParser(description="Make the engine's environment.")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--requirements", type=Path, action="append", default=[], help="a further file of requirements")
+    parser.add_argument("--wheels", type=Path, help="install from this folder, not from the network")
+    parser.add_argument("--fresh", action="store_true", help="start over even when a usable environment stands")
+    parser.add_argument("--door", action="store_true", help="end when standard input closes")
+    given = parser.parse_args()
+    if given.door:
+        threading.Thread(target=_end_with_stdin, daemon=True).start()
     try:
-        return subprocess.run(list(command), capture_output=True, check=False).returncode == 0
+        make(given.folder, more=given.requirements, wheels=given.wheels, fresh=given.fresh)
+    except subprocess.CalledProcessError as error:
+        return int(error.returncode) or 1
+    return 0
+
+
+def _end_with_stdin() -> None:
+    while os.read(0, 4096):
+        pass
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)
+    os._exit(1)
+
+
+def _call(words: Sequence[str]) -> None:
+    subprocess.run(list(words), stdin=subprocess.DEVNULL, check=True)
+
+
+def _works(words: Sequence[str]) -> bool:
+    try:
+        return subprocess.run(list(words), stdin=subprocess.DEVNULL, capture_output=True, check=False).returncode == 0
     except OSError:
         return False
 
 
 if __name__ == "__main__":
-    make(Path(sys.argv[1]), sys.executable, subprocess.check_call, more=[Path(p) for p in sys.argv[2:]])
+    sys.exit(main())

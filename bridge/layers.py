@@ -116,14 +116,15 @@ def copy_features(layer: QgsVectorLayer, sink: QgsFeatureSink, feedback: Any) ->
 
 def _write(path: Path, layer: str, names: List[str], features: List[Any]) -> None:
     """Write ``features`` (id, WKB, attributes) as one layer, a table without geometry when none has any."""
+    for place, name in enumerate(names):
+        if name.casefold() in {other.casefold() for other in (_ID, *names[:place])}:  # SQLite's names do not tell case
+            raise LayerError(tr("The field {} of {} cannot be handed to the engine: rename it.").format(name, layer))
     data = ogr.GetDriverByName("GPKG").CreateDataSource(str(path))
     spatial = any(wkb for _, wkb, _ in features)
     options = [f"FID={_ID}", "GEOMETRY_NAME=strandline_geometry", "SPATIAL_INDEX=NO"]
     table = data.CreateLayer(layer, None, ogr.wkbUnknown if spatial else ogr.wkbNone, options)
     for column, name in enumerate(names):
-        taken = {other.casefold() for other in (_ID, *names[:column])}  # SQLite's names do not tell case
-        if name.casefold() in taken or table.CreateField(_field(name, [row[column] for _, _, row in features])):
-            raise LayerError(tr("The field {} of {} cannot be handed to the engine: rename it.").format(name, layer))
+        table.CreateField(_field(name, [row[column] for _, _, row in features]))
     definition = table.GetLayerDefn()
     data.StartTransaction()
     for identity, wkb, row in features:

@@ -25,6 +25,7 @@ class StrandlinePlugin:
         """Register the provider; this is all that qgis_process asks for."""
         self._provider = StrandlineProvider()
         QgsApplication.processingRegistry().addProvider(self._provider)
+        self._provider.refreshAlgorithms()  # the models can be read only now
 
     def initGui(self) -> None:
         """Start in the desktop."""

@@ -1,6 +1,6 @@
 """The Processing provider ``strandline``."""
 
-from qgis.core import QgsProcessingModelAlgorithm, QgsProcessingProvider
+from qgis.core import QgsApplication, QgsProcessingModelAlgorithm, QgsProcessingProvider
 from qgis.PyQt.QtGui import QIcon
 
 from ..algorithms import ALGORITHMS
@@ -27,10 +27,13 @@ class StrandlineProvider(QgsProcessingProvider):
         return str(ROOT / "icon.svg")
 
     def loadAlgorithms(self) -> None:
-        """Add the algorithms and the ready models."""
+        """Add the algorithms and, once the registry knows these, the ready models made of them."""
         for algorithm in ALGORITHMS:
             self.addAlgorithm(algorithm())
-        # A model finds its steps when it runs: they are not registered before this returns.
+        if QgsApplication.processingRegistry().providerById(self.id()) is self:
+            self._load_models()
+
+    def _load_models(self) -> None:
         for path in sorted((ROOT / "models").glob("*.model3")):
             model = QgsProcessingModelAlgorithm()
             if model.fromFile(str(path)):
