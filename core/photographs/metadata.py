@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import math
 import re
-import struct
 import warnings
 from dataclasses import dataclass
 from typing import Any
@@ -13,13 +12,13 @@ from typing import Any
 from PIL import ExifTags, Image
 
 from ..survey import Position
+from .reading import BROKEN
 from .xmp import DJI, PIX4D_CAMERA, parse_xmp, xmp_number
 
 _DIAGONAL_35MM = math.hypot(36.0, 24.0)  # mm
 _SENSORS = 2.0, 100.0  # mm, the longer side
 _TIFF_HEADS = (b"II*\0", b"MM\0*")
 _PER_MM = {2: 1 / 25.4, 3: 0.1, 4: 1.0, 5: 1000.0}  # FocalPlaneResolutionUnit: inch, cm, mm, um
-_BROKEN = (OSError, SyntaxError, ValueError, TypeError, KeyError, IndexError, EOFError, ZeroDivisionError, struct.error)
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def read_metadata(data: bytes) -> Metadata:
             exif, packet = _containers(data)
             base, detail = dict(exif), dict(exif.get_ifd(ExifTags.IFD.Exif))
             gps = dict(exif.get_ifd(ExifTags.IFD.GPSInfo))
-        except _BROKEN as error:
+        except BROKEN as error:
             problems.append(f"EXIF is broken ({error})")
     problems += [f"EXIF is broken ({str(c.message).strip()})" for c in complaints if issubclass(c.category, UserWarning)][:1]
     properties: dict[tuple[str, str], str] = {}

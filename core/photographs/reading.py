@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import re
+import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -27,7 +28,21 @@ PNG = frozenset({".png"})
 _RAW = "3fr arw cr2 cr3 crw dng erf fff iiq kdc mos mrw nef nrw orf pef raf raw rw2 rwl sr2 srw x3f"
 RAW = frozenset(f".{kind}" for kind in _RAW.split())
 _ORIENTATION = 274  # TIFF tag
+
 DECODABLE = JPG | TIFF | PNG
+
+# What Pillow raises on broken files.
+BROKEN: tuple[type[Exception], ...] = (
+    OSError,
+    SyntaxError,
+    ValueError,
+    TypeError,
+    LookupError,
+    ArithmeticError,
+    EOFError,
+    struct.error,
+    Image.DecompressionBombError,
+)
 
 # In entropy-coded data 0xFF is followed by 0x00, by a restart marker, or by more 0xFF; anything else is a marker.
 _MARKER = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
@@ -139,9 +154,9 @@ def frame_size(data: bytes) -> tuple[int, int]:
     try:
         with Image.open(io.BytesIO(data)) as image:
             size = image.size
-            image.draft(None, (size[0] // 8, size[1] // 8))
+            image.draft(None, (max(1, size[0] // 8), max(1, size[1] // 8)))
             image.load()
-    except (OSError, SyntaxError, ValueError) as error:
+    except BROKEN as error:
         raise ValueError(f"not decodable, {error}") from error
     return size
 

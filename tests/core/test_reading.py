@@ -1,10 +1,12 @@
 """Decoding: depth, channels, the stored frame, and files that are not whole."""
 
+import contextlib
 import io
 
 import numpy as np
 import pytest
 from PIL import Image
+from strandline.core.photographs.metadata import read_metadata
 from strandline.core.photographs.reading import channel_sum, decode_pixels, frame_size
 
 RNG = np.random.default_rng(7)
@@ -105,3 +107,20 @@ def test_no_image(data):
 def test_float_pixels_are_refused():
     with pytest.raises(ValueError, match="float32"):
         frame_size(saved(np.ones((4, 4), np.float32), "TIFF"))
+
+
+def test_a_tiny_jpg_is_whole():
+    assert frame_size(saved(NOISE[:3, :5], "JPEG")) == (5, 3)
+
+
+def test_damaged_bytes_never_end_in_another_error():
+    # A ValueError names the photograph; anything else would pass for a bug.
+    rng = np.random.default_rng(9)
+    for kind in ("JPEG", "PNG"):
+        data = np.frombuffer(saved(NOISE, kind), np.uint8)
+        for _ in range(300):
+            damaged = data.copy()
+            damaged[rng.integers(2, len(data), 6)] = rng.integers(0, 256, 6)
+            with contextlib.suppress(ValueError):
+                frame_size(damaged.tobytes())
+            read_metadata(damaged.tobytes())
