@@ -62,9 +62,9 @@ def fake_engine(tmp_path, monkeypatch):
     return use
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def qgis_process(tmp_path_factory):
-    """Run qgis_process as a user does; return what it said and its exit status."""
+    """Run qgis_process as a user does, in a profile of its own; return its exit status and what it said."""
     profile = tmp_path_factory.mktemp("profile")
     program = next(p for p in ("/usr/bin/qgis_process.bin", "/usr/bin/qgis_process") if Path(p).is_file())
     environment = {

@@ -2,6 +2,9 @@
 
 import json
 import re
+import shutil
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -75,10 +78,26 @@ def test_install_refuses_a_python_that_will_not_do(qgis_process, tmp_path):
     assert "must be a Python of at least 3.11" in errors
 
 
-def test_the_package_holds_what_a_user_needs_and_is_reproducible(qgis_process, tmp_path):
-    import subprocess
-    import sys
+def test_a_failed_installation_is_told_and_not_taken_for_ready(qgis_process, tmp_path):
+    """Without any wheel in the folder pip fails, after the environment itself was made."""
+    package = tmp_path / "plugins" / "strandline"
+    shutil.copytree(
+        ROOT, package, ignore=lambda folder, names: [n for n in names if n.startswith(".") or n in ("tests", "dist", "demo")]
+    )
+    places = {"QGIS_PLUGINPATH": str(package.parent), "QGIS_CUSTOM_CONFIG_PATH": str(tmp_path / "profile")}
+    assert qgis_process.run("plugins", "enable", "strandline", **places)[0] == 0
+    (tmp_path / "wheels").mkdir()
+    status, told, errors = qgis_process.run(
+        "run", "strandline:checkengine", "--", "INSTALL=true", f"WHEELS={tmp_path / 'wheels'}", **places
+    )
+    assert status == 1
+    assert "The engine could not be installed: ERROR: No matching distribution found for numpy" in errors
+    assert [p.name for p in (tmp_path / "profile").rglob("pyvenv.cfg")] == ["pyvenv.cfg"]
+    status, told, _ = qgis_process.run("run", "strandline:checkengine", **places)
+    assert outputs(told) == {"READY": "false"}
 
+
+def test_the_package_holds_what_a_user_needs_and_is_reproducible(qgis_process, tmp_path):
     made = []
     for name in ("first", "second"):
         told = subprocess.run(
