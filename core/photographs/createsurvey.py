@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pyproj import CRS
 from shapely import Point
 
 from ..contract import VectorSource
@@ -20,10 +21,11 @@ from ..survey import Photograph, Survey, held
 from ..vector import write_layer
 from .inspection import Inspection, inspect
 from .listing import list_photographs, some
-from .positions import check_against_exif, read_positions, utm_zone, within_area
+from .positions import Table, distance_from_exif, median_place, read_positions, utm_zone, within_area
 from .surveyreport import write_report
 
 _MANY = 60  # photographs from which starting worker processes pays
+_FAR_FROM_EXIF = 1000.0  # m
 _HEIGHTS_DIFFER = 1.0  # m between EXIF and XMP
 
 
@@ -65,28 +67,17 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     _check_output(output)
     crs = projected_crs(request.crs) if request.crs else None
     names = list_photographs(images, (request.filter or "").strip() or None, output)
+    table = read_positions(request.positions, request.positions_crs, names) if request.positions else None
     inspections = _inspect(images, names, progress.part(0.0, 0.9))
     photographs = [i.photograph for i in inspections]
     notes = _notes(inspections)
-    if request.positions is not None:
-        table = read_positions(request.positions, request.positions_crs, names)
-        distance = check_against_exif(table, {p.name: p.position for p in photographs if p.position})
-        if distance is not None and distance > 1000.0:
-            notes.append(f"POSITIONS lie {distance / 1000:.0f} km from the positions in EXIF: check POSITIONS_CRS.")
-        if table.unmatched:
-            notes.append(f"POSITIONS has {len(table.unmatched)} rows without a photograph: {some(table.unmatched)}.")
+    if table:
+        notes += _notes_on_table(table, photographs)
         photographs = [replace(p, position=table.positions.get(p.name)) for p in photographs]
-    positions = {p.name: p.position for p in photographs if p.position is not None}
-    missing = [p.name for p in photographs if p.position is None]
-    if missing and positions:
-        notes.append(f"{len(missing)} of {len(photographs)} photographs have no position: {some(missing)}.")
+    positions = [p.position for p in photographs if p.position]
     if positions:
-        longitude = float(np.median([p.longitude for p in positions.values()]))
-        latitude = float(np.median([p.latitude for p in positions.values()]))
-        if crs is None:
-            crs = utm_zone(longitude, latitude)
-        elif not within_area(crs, np.array([longitude]), np.array([latitude])).all():
-            notes.append(f"The photographs lie outside the area of {crs.name}: choose another CRS, unless that is meant.")
+        notes += _notes_on_positions(photographs, crs)
+        crs = crs or utm_zone(*median_place(positions))
     else:
         notes.append("No photograph has a position: georeferencing will need ground control points.")
     for note in notes:
@@ -178,6 +169,28 @@ def _notes(inspections: list[Inspection]) -> list[str]:
             f"EXIF and XMP tell heights more than {_HEIGHTS_DIFFER:g} m apart in {len(differ)} photographs ({some(differ)}): "
             "XMP's is used where it has RTK sigmas, else EXIF's."
         )
+    return notes
+
+
+def _notes_on_table(table: Table, photographs: list[Photograph]) -> list[str]:
+    """Return what the user should know about the POSITIONS table; ``photographs`` have the positions of EXIF."""
+    notes = []
+    distance = distance_from_exif(table, [p.position for p in photographs if p.position])
+    if distance is not None and distance > _FAR_FROM_EXIF:
+        notes.append(f"POSITIONS lie {distance / 1000:.0f} km from the positions in EXIF: check POSITIONS_CRS.")
+    if table.unmatched:
+        notes.append(f"POSITIONS has {len(table.unmatched)} rows without a photograph: {some(table.unmatched)}.")
+    return notes
+
+
+def _notes_on_positions(photographs: list[Photograph], crs: CRS | None) -> list[str]:
+    notes = []
+    missing = [p.name for p in photographs if p.position is None]
+    if missing:
+        notes.append(f"{len(missing)} of {len(photographs)} photographs have no position: {some(missing)}.")
+    longitude, latitude = median_place([p.position for p in photographs if p.position])
+    if crs and not within_area(crs, np.array([longitude]), np.array([latitude])).all():
+        notes.append(f"The photographs lie outside the area of {crs.name}: choose another CRS, unless that is meant.")
     return notes
 
 

@@ -23,7 +23,7 @@ from .listing import some
 
 Array = NDArray[np.float64]
 _WGS84 = CRS("EPSG:4326")
-_FAR_FROM_EXIF = 10_000.0  # m
+_FAR_FROM_EXIF = 10_000.0  # m between what is not the same place
 _FAR = 1.0  # degrees that a position may lie outside its CRS's area of use; grids are used a little beyond their zone
 
 
@@ -221,7 +221,7 @@ def _area_of_use(crs: CRS) -> Any:
     return CRS.from_epsg(code).area_of_use if code else None
 
 
-def check_against_exif(table: Table, exif: dict[str, Position]) -> float | None:
+def distance_from_exif(table: Table, exif: list[Position]) -> float | None:
     """Return the distance (m) between the medians of the table's and of EXIF's positions, None without EXIF.
 
     Raises
@@ -231,7 +231,7 @@ def check_against_exif(table: Table, exif: dict[str, Position]) -> float | None:
     """
     if not table.positions or not exif:
         return None
-    ours, theirs = _median(table.positions), _median(exif)
+    ours, theirs = median_place(list(table.positions.values())), median_place(exif)
     geod = Geod(ellps="WGS84")
     distance = geod.inv(*ours, *theirs)[2]
     if distance > _FAR_FROM_EXIF and abs(ours[0]) <= 90.0 and geod.inv(ours[1], ours[0], *theirs)[2] < _FAR_FROM_EXIF:
@@ -239,11 +239,9 @@ def check_against_exif(table: Table, exif: dict[str, Position]) -> float | None:
     return float(distance)
 
 
-def _median(positions: dict[str, Position]) -> tuple[float, float]:
-    return (
-        float(np.median([p.longitude for p in positions.values()])),
-        float(np.median([p.latitude for p in positions.values()])),
-    )
+def median_place(positions: list[Position]) -> tuple[float, float]:
+    """Return the median longitude and latitude (degrees)."""
+    return float(np.median([p.longitude for p in positions])), float(np.median([p.latitude for p in positions]))
 
 
 def _none(value: float) -> float | None:
