@@ -25,18 +25,18 @@ def verdict(solution: Solution, result: Result) -> str:
     """Return one sentence for the analyst."""
     counts = []
     if result.control_count:
-        counts.append(f"{result.control_count} control points")
+        counts.append(_points(result.control_count, "control point"))
     if "GNSS" in solution.based_on:
-        counts.append(f"the GNSS positions of {len(solution.gnss_errors)} photographs")
+        counts.append(f"the GNSS positions of {_points(len(solution.gnss_errors), 'photograph')}")
     text = f"Georeferenced by a similarity on {' and '.join(counts)}"
     if result.plani_check is not None:
-        text += f"; {result.check_count} check points differ by {_pair(result.plani_check, result.alti_check)}"
+        text += f"; {_points(result.check_count, 'check point')}, off by {_pair(result.plani_check, result.alti_check)}"
     elif result.plani_loo is not None:
-        text += f"; left out one by one, the control points differ by {_pair(result.plani_loo, result.alti_loo)}"
+        text += f"; left out one by one, the control points are off by {_pair(result.plani_loo, result.alti_loo)}"
     elif result.plani_control is not None:
-        text += f"; the control points themselves differ by {_pair(result.plani_control, result.alti_control)}"
+        text += f"; the control points themselves are off by {_pair(result.plani_control, result.alti_control)}"
     elif result.plani_gnss is not None:
-        text += f"; they differ by {_pair(result.plani_gnss, result.alti_gnss)}, and no independent point checks the result"
+        text += f"; they are off by {_pair(result.plani_gnss, result.alti_gnss)}, and no independent point checks the result"
     if solution.blunders:
         text += f"; suspicious: {', '.join(dict.fromkeys(b.name for b in solution.blunders))}"
     return text + "."
@@ -155,3 +155,7 @@ def _pair(plan: float | None, height: float | None) -> str:
 
 def _metres(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f} m" if abs(value) < 1 else f"{value:.2f} m"
+
+
+def _points(count: int, noun: str) -> str:
+    return f"{count} {noun}{'s' * (count != 1)}"
