@@ -1,16 +1,48 @@
-"""Step ``orient``: poses and interior orientation from tie points alone, in a free frame."""
+"""Step ``orient``: poses and interior orientation from tie points alone, in a free frame.
+
+The block grows on thinned matches with a camera of one radial term; then the asked camera model is adjusted; then the tie
+points of all matches are triangulated and everything is adjusted together. The result depends on nothing but its input: a
+run that was interrupted is run again and gives the same to the bit.
+"""
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
+import numpy as np
+import pycolmap
+
+from ..camera import Camera
+from ..errors import InputError, NotEnoughData
+from ..files import digest, whole
+from ..photographs.listing import some
 from ..progress import SILENT, Progress
+from ..survey import Survey, held
+from ..tiepoints.database import NAME
+from ..tiepoints.statistics import Statistics, micmac_statistics, weakest_link
+from . import selfcalibration as calibrating
+from .calibration import MODEL, read_calibration
+from .mapping import camera_from_colmap, map_photographs, read_network, triangulate
+from .orientreport import Orientation, write_report
+from .pointcloud import write_points
+from .sparse import block_from_model
+
+VERSION = 1  # raise it when the same input would give another result
+_WEAK_LINK = 100  # points of three or more rays below which a link between two parts of the block is told of
+_MULTI = 10  # observations of points with three or more rays below which a photograph's pose is not believed
 
 
 @dataclass(frozen=True)
 class Request:
-    """``calibration`` is another survey's folder; ``tie_points`` is a LAZ to write."""
+    """``calibration`` is another survey's folder; ``tie_points`` is a LAZ to write.
+
+    ``calibration_use`` "fixed" holds its cameras; "prior" starts from them, holds them while the block grows and adjusts them
+    at the end with ``camera_model``. ``mapper`` "auto" is "incremental".
+    """
 
     survey: str
     camera_model: Literal["brown", "radial", "simple_radial", "full"] = "brown"
@@ -30,13 +62,162 @@ class Result:
     output: str
     oriented_count: int
     mtp: float
-    mtp_percent: float
+    mtp_percent: float | None
     mmtp: float
-    mmtp_percent: float
-    mse: float
+    mmtp_percent: float | None
+    mse: float | None
     tie_points: str | None = None
 
 
 def run(request: Request, progress: Progress = SILENT) -> Result:
-    """Orient the photographs."""
-    raise NotImplementedError
+    """Orient the photographs.
+
+    Raises
+    ------
+    InputError
+        When the request cannot be met.
+    NotEnoughData
+        When no two photographs can be oriented to each other.
+    """
+    if request.tie_points is not None and Path(request.tie_points).suffix.lower() not in (".laz", ".las"):
+        raise InputError(f"TIE_POINTS {request.tie_points} must be LAS or LAZ: give a name that ends in .laz.")
+    Survey.open(request.survey)  # before a lock is put into a folder that is none
+    with held(request.survey, "orient"):
+        survey = Survey.open(request.survey)
+        standing = survey.require("tiepoints")
+        known = read_calibration(request.calibration, survey.photographs) if request.calibration else {}
+        parameters = {
+            "camera_model": request.camera_model,
+            "calibration": request.calibration,
+            "calibration_use": request.calibration_use if request.calibration else None,
+            "mapper": "incremental" if request.mapper == "auto" else request.mapper,
+        }
+        fingerprint = digest(VERSION, standing.fingerprint, {**parameters, "calibration": known})
+        record = survey.record("orient")
+        stands = record is not None and record.fingerprint == fingerprint and not survey.is_stale("orient")
+        if record is not None and stands and (survey.folder / MODEL).is_dir() and survey.report_path("orient").is_file():
+            progress.info("The photographs are oriented already under these parameters.")
+            if request.output_html_file:
+                with whole(request.output_html_file) as part:
+                    shutil.copyfile(survey.report_path("orient"), part)
+            numbers = record.result
+        else:
+            numbers = _orient(request, survey, known, progress)
+            survey.finish("orient", fingerprint, built_on=("tiepoints",), parameters=parameters, result=numbers)
+        if request.tie_points:
+            block = block_from_model(pycolmap.Reconstruction(survey.folder / MODEL))
+            write_points(request.tie_points, block.points, rays=block.rays, errors=block.errors)
+    progress.at(1.0)
+    return Result(output=request.survey, tie_points=request.tie_points, **numbers)
+
+
+def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progress: Progress) -> dict[str, Any]:
+    """Orient, write model/ and the report, and return the numbers."""
+    database = survey.folder / NAME
+    network = read_network(database)
+    given = {network.camera_of[i]: known[name] for i, name in network.names.items() if name in known}
+    fixed = set(given) if request.calibration_use == "fixed" else set()
+    mapper: Literal["incremental", "global"] = "global" if request.mapper == "global" else "incremental"
+    models = map_photographs(database, network, mapper=mapper, given=given, progress=progress.part(0.0, 0.5))
+    model = models[0]
+    for camera_id, camera in model.cameras.items():
+        if camera_id not in fixed:
+            wanted = calibrating.MODELS[request.camera_model]
+            calibrating.set_camera(model, camera_id, calibrating.convert_camera(camera_from_colmap(camera), wanted))
+    calibrating.self_calibrate(model, request.camera_model, fixed, rounds=2, iterations=50)
+    progress.at(0.55)
+    sigmas = calibrating.camera_sigmas(model, request.camera_model, fixed)
+    progress.at(0.6)
+    model = triangulate(database, model)
+    progress.at(0.7)
+    calibrating.self_calibrate(model, request.camera_model, fixed, rounds=1, iterations=20)
+    progress.at(0.85)
+    _drop_weak(model)
+    entering = calibrating.observations(model)
+    if not len(entering.image):
+        raise NotEnoughData(
+            f"No tie point of {survey.folder} survives the adjustment: look at the report of strandline:tiepoints."
+        )
+    sigma = calibrating.robust_sigma(entering.length)
+    calibrating.adjust(model, request.camera_model, fixed, robust=max(2 * sigma, 0.1), iterations=30)
+    entering = calibrating.observations(model)
+    limit = calibrating.FILTER * calibrating.robust_sigma(entering.length)
+    calibrating.drop_observations(model, entering, limit)
+    model.update_point_3d_errors()
+    progress.at(0.95)
+    statistics, ids = _statistics(model, entering)
+    names = [network.names[i] for i in ids]
+    missing = sorted({p.name for p in survey.photographs} - set(names))
+    if missing:
+        progress.warn(f"{len(missing)} of {len(survey.photographs)} photographs could not be oriented: {some(missing)}.")
+    survey.forget("orient")
+    with whole(survey.folder / MODEL) as part:
+        part.mkdir()
+        model.write(part)
+    link = _weak_link(calibrating.observations(model), ids, names)
+    if link:
+        progress.warn(link)
+    outcome = Orientation(
+        statistics=statistics,
+        observations=calibrating.observations(model),
+        image_ids=ids,
+        limit=limit,
+        missing=missing,
+        others=[sorted(m.images[i].name for i in m.reg_image_ids()) for m in models[1:]],
+        link=link,
+        sigmas=sigmas,
+        fixed=fixed,
+    )
+    write_report(survey, model, outcome, request.output_html_file)
+    return {
+        "oriented_count": len(names),
+        "mtp": statistics.mtp,
+        "mtp_percent": statistics.mtp_percent,
+        "mmtp": statistics.mmtp,
+        "mmtp_percent": statistics.mmtp_percent,
+        "mse": statistics.mse,
+    }
+
+
+def _drop_weak(model: pycolmap.Reconstruction) -> None:
+    """Take out, weakest first, photographs that hardly any point of three rays ties to the block.
+
+    Two-ray points hold a pair together but not its distance from the rest. A block of two photographs has no others.
+    """
+    while model.num_reg_images() > 2:
+        found = calibrating.observations(model)
+        point, rays = np.unique(found.point, return_counts=True)
+        multi = rays[np.searchsorted(point, found.point)] >= 3
+        counts = {image: int((multi & (found.image == image)).sum()) for image in sorted(model.reg_image_ids())}
+        weakest = min(counts, key=lambda image: (counts[image], image))
+        if counts[weakest] >= _MULTI:
+            return
+        pycolmap.ObservationManager(model).deregister_frame(model.images[weakest].frame_id)
+
+
+def _weak_link(found: calibrating.Observations, ids: list[int], names: list[str]) -> str:
+    """Return a sentence on the weakest link of the block when it is weak, else nothing."""
+    index = {image: n for n, image in enumerate(ids)}
+    _, track = np.unique(found.point, return_inverse=True)
+    link = weakest_link(np.array([index[i] for i in found.image.tolist()], np.int64), track, len(ids))
+    if link is None or link[0] >= _WEAK_LINK:
+        return ""
+    apart = some(names[i] for i in link[1])
+    return (
+        f"Only {link[0]} points of three or more rays tie {apart} to the rest of the block: their scale and tilt against it are "
+        "uncertain, so give control points on both sides."
+    )
+
+
+def _statistics(model: pycolmap.Reconstruction, entering: calibrating.Observations) -> tuple[Statistics, list[int]]:
+    """Return the statistics of what entered the final adjustment, by photographs sorted by name, and their image ids."""
+    ids = sorted(model.reg_image_ids(), key=lambda i: model.images[i].name)
+    index = {image: n for n, image in enumerate(ids)}
+    kept = np.zeros(len(entering.image), bool)
+    for image in ids:
+        left = np.array(model.images[image].get_observation_point2D_idxs(), np.int64)
+        mine = entering.image == image
+        kept[mine] = np.isin(entering.keypoint[mine], left)
+    _, track = np.unique(entering.point, return_inverse=True)
+    photograph = np.array([index[i] for i in entering.image.tolist()], np.int64)
+    return micmac_statistics(photograph, track, entering.length, kept, len(ids)), ids

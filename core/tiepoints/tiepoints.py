@@ -2,10 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
+import numpy as np
+
+from ..camera import Camera
+from ..contract import decode, encode
+from ..errors import InputError, NotEnoughData
+from ..files import digest, file_digest, remove
+from ..parallel import run_calls
+from ..photographs.enhance import enhanced_path
+from ..photographs.listing import some
+from ..photographs.reading import channel_sum, decode_photograph, decode_pixels, mean_level
 from ..progress import SILENT, Progress
+from ..survey import Photograph, Survey, held
+from . import features, matching
+from .database import NAME, provisional_camera, write_database
+from .features import read_features
+from .matching import PairMatches
+from .pairs import Pair, blocks, choose_pairs, pairs_through_others
+from .tiereport import write_report
+
+CACHE = "cache"  # features and matches, so that what is done need not be done again; it may be deleted
+_TRUSTED = 50  # matches from which a pair may tell where a third photograph lies
 
 
 @dataclass(frozen=True)
@@ -33,5 +55,186 @@ class Result:
 
 
 def run(request: Request, progress: Progress = SILENT) -> Result:
-    """Find tie points."""
-    raise NotImplementedError
+    """Find tie points.
+
+    Features are kept per photograph and matches per pair, under the content they were made from, so that a run that was
+    interrupted goes on where it was, and one with other photographs does only what is new.
+
+    Raises
+    ------
+    InputError
+        When the request cannot be met, or a photograph has gone, changed, or cannot be decoded.
+    NotEnoughData
+        When there are no two photographs, or no two that share anything.
+    """
+    if request.max_features < 0:
+        raise InputError(f"MAX_FEATURES={request.max_features} is negative: give a number, or 0 for no limit.")
+    if request.max_size < 0 or 0 < request.max_size < 200:
+        raise InputError(f"MAX_SIZE={request.max_size} is too small to find anything: give 200 or more, or 0 for full size.")
+    Survey.open(request.survey)  # before a lock is put into a folder that is none
+    with held(request.survey, "tiepoints"):
+        survey = Survey.open(request.survey)
+        survey.require("createsurvey")
+        photographs = [p for p in survey.photographs if p.decodable]
+        if len(photographs) < 2:
+            raise NotEnoughData(
+                f"The survey {survey.folder} has {len(photographs)} photograph that can be decoded: tie points need two or more."
+            )
+        enhanced = _use_enhanced(request, survey, progress)
+        images = [enhanced_path(survey, p) if enhanced else survey.path(p) for p in photographs]
+        cache = survey.folder.absolute() / CACHE
+        found = _features(request, photographs, images, enhanced, cache / "features", progress.part(0.0, 0.4))
+        xy = [read_features(path).xy for path in found]
+        counts = [len(points) for points in xy]
+        if min(counts) == 0:
+            empty = [p.name for p, n in zip(photographs, counts, strict=True) if n == 0]
+            progress.warn(f"No features were found in {some(empty)}.")
+        pairs, rule, keys = _pairs(request, photographs, found, cache / "matches", progress.part(0.4, 0.95))
+        if not pairs:
+            raise NotEnoughData(
+                f"No two photographs of {survey.folder} share {matching.LEAST} points: check that they overlap"
+                + ("." if enhanced else ", and run strandline:enhance first.")
+            )
+        survey.forget("tiepoints")
+        write_database(survey.folder / NAME, photographs, (read_features(path).keypoints() for path in found), pairs)
+        match_count = sum(len(p.matches) for p in pairs.values())
+        groups = blocks(len(photographs), pairs)
+        if len(groups) > 1:
+            progress.warn(_apart(photographs, groups))
+        notes = [_apart(photographs, groups)] if len(groups) > 1 else []
+        write_report(survey, photographs, images, xy, pairs, rule=rule, notes=notes, copy=request.output_html_file)
+        result = Result(request.survey, float(np.mean(counts)), len(pairs), match_count)
+        survey.finish(
+            "tiepoints",
+            digest([path.stem for path in found], keys, [p.name for p in photographs]),
+            built_on=("createsurvey", "enhance") if enhanced else ("createsurvey",),
+            parameters={
+                "source": "enhanced" if enhanced else "original",
+                "max_features": request.max_features,
+                "max_size": request.max_size,
+                "pairs": request.pairs,
+            },
+            result={"mean_features": result.mean_features, "pair_count": len(pairs), "match_count": match_count},
+        )
+        _remove_strays(cache, {*found, *(cache / "matches" / f"{key}.npz" for key in keys)})
+    progress.at(1.0)
+    return result
+
+
+def _use_enhanced(request: Request, survey: Survey, progress: Progress) -> bool:
+    """Tell whether the enhanced images are to be used, and warn when ``auto`` must do without."""
+    if request.source != "auto":
+        if request.source == "enhanced":
+            survey.require("enhance")
+        return request.source == "enhanced"
+    if survey.record("enhance") is not None and not survey.is_stale("enhance"):
+        return True
+    why = "are stale" if survey.record("enhance") else "have not been made"
+    progress.warn(f"The enhanced images {why}, so the photographs themselves are used: on sand, run strandline:enhance first.")
+    return False
+
+
+def _features(
+    request: Request, photographs: Sequence[Photograph], images: Sequence[Path], enhanced: bool, folder: Path, progress: Progress
+) -> list[Path]:
+    """Return the file with the features of each photograph, after making those that are missing."""
+    parameters = [features.VERSION, request.max_features, request.max_size]
+    contents = [file_digest(path) if enhanced else [p.digest, "original"] for path, p in zip(images, photographs, strict=True)]
+    paths = [folder / f"{digest(content, parameters)}.npz" for content in contents]
+    missing = [i for i, path in enumerate(paths) if not path.is_file()]
+    if len(missing) < len(paths):
+        progress.info(f"The features of {len(paths) - len(missing)} of {len(paths)} photographs stand already.")
+    calls = (
+        (
+            str(images[i].absolute()),
+            None if enhanced else encode(photographs[i]),
+            str(paths[i]),
+            request.max_features,
+            request.max_size,
+        )
+        for i in missing
+    )
+    for _ in run_calls(
+        _find_features,
+        calls,
+        workers=request.workers,
+        scheduler=request.scheduler,
+        progress=progress,
+        total=len(missing),
+    ):
+        pass
+    return paths
+
+
+def _find_features(image: str, photograph: dict[str, Any] | None, path: str, max_features: int, max_size: int) -> None:
+    """Write the features of an enhanced image, or of the photograph that ``photograph`` describes."""
+    source = Path(image)
+    if photograph is None:
+        try:
+            grey = decode_pixels(source.read_bytes())
+        except ValueError as error:
+            raise InputError(f"The enhanced image {image} is {error}: delete it and run strandline:enhance again.") from error
+    else:
+        grey = mean_level(channel_sum(decode_photograph(source, decode(Photograph, photograph))))
+    features.write_features(Path(path), features.detect(grey, max_features=max_features, max_size=max_size))
+
+
+def _pairs(
+    request: Request, photographs: Sequence[Photograph], found: Sequence[Path], folder: Path, progress: Progress
+) -> tuple[dict[Pair, PairMatches], str, list[str]]:
+    """Return the verified pairs, the rule by which pairs were chosen, and the keys of all files of matches."""
+    chosen, rule = choose_pairs(photographs, request.pairs)
+    cameras = [encode(provisional_camera(p)) for p in photographs]
+
+    def key(i: int, j: int, *more: Any) -> str:
+        return digest(matching.VERSION, found[i].stem, found[j].stem, cameras[i], cameras[j], *more)
+
+    def match(wanted: dict[Pair, tuple[str, Any]], part: Progress) -> dict[Pair, PairMatches]:
+        paths = {pair: folder / f"{name}.npz" for pair, (name, _) in wanted.items()}
+        missing = [pair for pair, path in paths.items() if not path.is_file()]
+        calls = ((str(found[i]), str(found[j]), cameras[i], cameras[j], str(paths[i, j]), wanted[i, j][1]) for i, j in missing)
+        for _ in run_calls(
+            _match_files, calls, workers=request.workers, scheduler=request.scheduler, progress=part, total=len(missing)
+        ):
+            pass
+        result = {pair: matching.read_matches(path) for pair, path in paths.items()}
+        return {pair: m for pair, m in result.items() if len(m.matches)}
+
+    first = {(i, j): (key(i, j), None) for i, j in chosen}
+    verified = match(first, progress.part(0.0, 0.9))
+    sizes = [(p.width, p.height) for p in photographs]
+    through = pairs_through_others({k: (len(m.matches), m.homography) for k, m in verified.items()}, sizes, _TRUSTED)
+    second = {(i, j): (key(i, j, h.tolist()), h.tolist()) for i, j, h in through}
+    more = match(second, progress.part(0.9, 1.0))
+    names = sorted(name for name, _ in (*first.values(), *second.values()))
+    text = f"{len(chosen)} pairs were compared ({rule}), and {len(second)} more that a third photograph pointed to"
+    return dict(sorted({**verified, **more}.items())), text, names
+
+
+def _match_files(
+    first: str, second: str, camera1: dict[str, Any], camera2: dict[str, Any], path: str, homography: list[list[float]] | None
+) -> None:
+    """Match the features in two files and write what is found, which may be nothing."""
+    a, b = read_features(Path(first)), read_features(Path(second))
+    cameras = decode(Camera, camera1), decode(Camera, camera2)
+    if homography is None:
+        found = matching.match_pair(a, b, cameras)
+    else:
+        found = matching.match_predicted(a, b, cameras, np.array(homography))
+    matching.write_matches(Path(path), found)
+
+
+def _apart(photographs: Sequence[Photograph], groups: list[list[int]]) -> str:
+    """Return in one sentence which photographs are not tied to the rest."""
+    names = "; ".join(some(photographs[i].name for i in group) for group in groups[1:6])
+    return (
+        f"The photographs fall into {len(groups)} blocks that share no tie points, of which only the largest "
+        f"({len(groups[0])} photographs) will be oriented; apart are: {names}."
+    )
+
+
+def _remove_strays(folder: Path, used: set[Path]) -> None:
+    """Remove from the cache what this run did not use."""
+    for path in folder.glob("*/*"):
+        if path not in used:
+            remove(path)

@@ -1,0 +1,182 @@
+"""Matches of one pair of photographs: a few coarse features give the geometry, the geometry guides all the others.
+
+Comparing every feature with every other costs seconds a pair, and on sand, which looks alike all over, it finds less:
+the ratio test meets a rival somewhere in the other photograph. So the largest few features are compared exhaustively
+(their product is one of whole numbers, exact in float32 in any order), a two-view geometry is fitted to them, and the
+rest are compared only where that geometry allows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pycolmap
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..files import whole
+from .features import Features, spread
+from .guided import guided_matches
+
+Array = NDArray[np.float64]
+
+VERSION = 1  # part of the key under which matches are kept
+LIMIT = 4.0 / 2000.0  # a verified match is this near its epipolar line (or homography), as a share of the longer side
+LEAST = 15  # verified matches below which a pair is not one
+_COARSE = 3000
+_COARSE_RATIO = 0.85
+_RATIO = 0.85
+_PRODUCT = 0.80
+_NONE = np.zeros((0, 2), np.int32)
+
+
+@dataclass(frozen=True)
+class PairMatches:
+    """Verified matches (m, 2) of a pair, as indices of features, and COLMAP's two-view geometry.
+
+    ``config`` is COLMAP's; the matrices (3, 3; second from first) are zero when absent. ``homography`` is the least-squares one
+    of all matches, whether or not the ground is flat.
+    """
+
+    matches: NDArray[np.int32]
+    config: int
+    essential: Array
+    fundamental: Array
+    homography: Array
+
+    @classmethod
+    def none(cls) -> PairMatches:
+        """Return what a pair without a verified geometry has."""
+        zero = np.zeros((3, 3))
+        return cls(_NONE, int(pycolmap.TwoViewGeometryConfiguration.DEGENERATE), zero, zero, zero)
+
+
+def match_pair(first: Features, second: Features, cameras: tuple[Camera, Camera]) -> PairMatches:
+    """Match two photographs and verify the matches against a two-view geometry."""
+    chosen = [coarse(f, c) for f, c in zip((first, second), cameras, strict=True)]
+    rough = mutual_matches(first.descriptors[chosen[0]], second.descriptors[chosen[1]], ratio=_COARSE_RATIO)
+    rough = np.column_stack([chosen[0][rough[:, 0]], chosen[1][rough[:, 1]]]).astype(np.int32)
+    geometry = verify(first, second, cameras, rough)
+    kept = geometry.matches
+    if len(kept) < LEAST:
+        return PairMatches.none()
+    turns = second.angle[kept[:, 1]] - first.angle[kept[:, 0]]
+    guided = _match_all(
+        first,
+        second,
+        cameras,
+        geometry,
+        turn=float(np.arctan2(np.median(np.sin(turns)), np.median(np.cos(turns)))),
+        zoom=float(np.exp(np.median(np.log(second.scale[kept[:, 1]] / first.scale[kept[:, 0]])))),
+    )
+    return guided if len(guided.matches) > len(kept) else geometry
+
+
+def match_predicted(first: Features, second: Features, cameras: tuple[Camera, Camera], homography: Array) -> PairMatches:
+    """Match two photographs of which a homography (3, 3, second from first) is known roughly, to 3 % of the longer side."""
+    a, b, _, c, d, *_ = (homography / homography[2, 2]).ravel()
+    predicted = PairMatches(_NONE, 0, np.zeros((3, 3)), np.zeros((3, 3)), homography)
+    return _match_all(
+        first, second, cameras, predicted, turn=float(np.arctan2(c - b, a + d)), zoom=float(np.sqrt(max(a * d - b * c, 1e-6)))
+    )
+
+
+def _match_all(
+    first: Features, second: Features, cameras: tuple[Camera, Camera], geometry: PairMatches, *, turn: float, zoom: float
+) -> PairMatches:
+    """Match all features where the geometry allows, and verify."""
+    if min(len(first), len(second)) == 0 or abs(np.linalg.det(geometry.homography)) < 1e-9:
+        return PairMatches.none()
+    longer = max(cameras[1].width, cameras[1].height)
+    reach = 0.03 * longer
+    if len(kept := geometry.matches):
+        mapped = cv2.perspectiveTransform(first.xy[kept[:, 0]][None], geometry.homography)[0]
+        off = np.hypot(*(mapped - second.xy[kept[:, 1]]).T)
+        reach = float(np.clip(1.5 * np.quantile(off, 0.98), 2 * LIMIT * longer, 0.1 * longer))
+    guided = guided_matches(
+        first,
+        second,
+        geometry.homography,
+        geometry.fundamental if geometry.fundamental.any() else None,
+        reach=reach,
+        band=LIMIT * longer,
+        turn=turn,
+        zoom=zoom,
+        ratio=_RATIO,
+        least=_PRODUCT,
+    )
+    # One place seen under two orientations is one match.
+    places = np.concatenate([first.xy[guided[:, 0]], second.xy[guided[:, 1]]], axis=1)
+    _, unique = np.unique(np.rint(places), axis=0, return_index=True)
+    return verify(first, second, cameras, guided[np.sort(unique)])
+
+
+def coarse(features: Features, camera: Camera) -> NDArray[np.intp]:
+    """Return the indices of the largest features, spread over the photograph."""
+    return spread(features.xy, features.scale, (camera.width, camera.height), _COARSE)
+
+
+def mutual_matches(first: NDArray[np.uint8], second: NDArray[np.uint8], *, ratio: float) -> NDArray[np.int32]:
+    """Return the mutually best matches (m, 2) of descriptors (n, 128) that pass the ratio test both ways."""
+    if min(len(first), len(second)) < 2:
+        return _NONE
+    products = first.astype(np.float32) @ second.astype(np.float32).T
+    forward = _passing(products, ratio)
+    backward = _passing(products.T, ratio)
+    index = np.flatnonzero(forward >= 0)
+    index = index[backward[forward[index]] == index]
+    return np.column_stack([index, forward[index]]).astype(np.int32)
+
+
+def verify(first: Features, second: Features, cameras: tuple[Camera, Camera], matches: NDArray[np.int32]) -> PairMatches:
+    """Return the matches that agree with one two-view geometry, found by RANSAC with a fixed seed."""
+    if len(matches) < LEAST:
+        return PairMatches.none()
+    options = pycolmap.TwoViewGeometryOptions()
+    options.min_num_inliers = LEAST
+    options.detect_watermark = False
+    options.ransac.max_error = LIMIT * max(*(max(c.width, c.height) for c in cameras))
+    options.ransac.random_seed = 1
+    given = [pycolmap.Camera(model=c.model, width=c.width, height=c.height, params=list(c.params)) for c in cameras]
+    for camera in given:
+        camera.has_prior_focal_length = False  # an uncertain focal length must not reject matches
+    found = pycolmap.estimate_two_view_geometry(
+        given[0], first.xy.astype(float), given[1], second.xy.astype(float), matches.astype(np.uint32), options
+    )
+    kept = np.asarray(found.inlier_matches, np.int32).reshape(-1, 2)
+    if len(kept) < LEAST:
+        return PairMatches.none()
+    essential, fundamental = (np.zeros((3, 3)) if m is None else np.array(m, float) for m in (found.E, found.F))
+    plane, _ = cv2.findHomography(first.xy[kept[:, 0]], second.xy[kept[:, 1]], 0)
+    # A homography that sends the photograph's corner to infinity cannot predict anything.
+    usable = plane is not None and abs(plane[2, 2]) > 1e-9
+    homography = plane / plane[2, 2] if usable else np.zeros((3, 3))
+    return PairMatches(kept, int(found.config), essential, fundamental, homography)
+
+
+def write_matches(path: Path, pair: PairMatches) -> None:
+    """Write a pair's matches to an npz, whole or not at all."""
+    with whole(path) as part, part.open("wb") as stream:
+        np.savez(
+            stream, matches=pair.matches, config=pair.config, essential=pair.essential, fundamental=pair.fundamental,
+            homography=pair.homography,
+        )  # fmt: skip
+
+
+def read_matches(path: Path) -> PairMatches:
+    """Read what ``write_matches`` wrote."""
+    with np.load(path, allow_pickle=False) as data:
+        return PairMatches(data["matches"], int(data["config"]), data["essential"], data["fundamental"], data["homography"])
+
+
+def _passing(products: NDArray[np.float32], ratio: float) -> NDArray[np.int64]:
+    """Return the best column of each row where it passes the ratio test, else -1."""
+    best = products.argmax(axis=1)
+    rows = np.arange(len(products))
+    top = products[rows, best]
+    second = np.partition(products, -2, axis=1)[:, -2]
+    unit = np.float32(512.0**2)
+    return np.where(np.maximum(unit - top, 0) <= ratio**2 * (unit - second), best, -1)
