@@ -114,8 +114,6 @@ def _residual_fields(solution: Solution) -> dict[str, Any]:
         "role": [_role(s) for s in seen],
         "marks": [s.marks for s in seen],
         **_components(solution.errors),
-        "dx": solution.errors[:, 0],  # what the arrows' style looks for
-        "dy": solution.errors[:, 1],
         "plani": np.hypot(solution.errors[:, 0], solution.errors[:, 1]),
         "sigma_h": [s.point.sigma_h for s in seen],
         "sigma_v": [s.point.sigma_v for s in seen],
