@@ -18,7 +18,7 @@ from .triangulation import Triangulated, triangulate
 
 Array = NDArray[np.float64]
 
-_UNDETERMINED = 0.2  # rad, or share of the scale: an axis known no better is not known
+_UNDETERMINED = 0.5  # rad, or share of the scale: an axis known no better is not known; what is merely weak is told by its sigma
 
 
 @dataclass(frozen=True)
