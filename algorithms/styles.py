@@ -6,10 +6,12 @@ QGIS keeps no reference to them.
 
 import math
 from collections.abc import Iterator
-from typing import Any, Callable, List
+from typing import Any, Callable, List, Tuple
 
 from qgis.core import (
+    QgsArrowSymbolLayer,
     QgsColorRampShader,
+    QgsLineSymbol,
     QgsMarkerSymbol,
     QgsProcessingContext,
     QgsProcessingFeedback,
@@ -44,7 +46,7 @@ class Style(QgsProcessingLayerPostProcessorInterface):
             layer.triggerRepaint()
 
 
-def _between(layer: QgsRasterLayer, low: float, high: float, colours: Any) -> None:
+def _between(layer: QgsRasterLayer, low: float, high: float, colours: Tuple[str, ...]) -> None:
     """Draw band 1 with ``colours`` spread evenly from ``low`` to ``high``."""
     if not high > low:
         high = low + 1.0
@@ -65,24 +67,30 @@ def _between(layer: QgsRasterLayer, low: float, high: float, colours: Any) -> No
     layer.setRenderer(renderer)
 
 
-def _percentiles(layer: QgsRasterLayer, low: float, high: float) -> Any:
+def _range(layer: QgsRasterLayer) -> Tuple[float, float]:
+    """Return the 2nd and 98th percentile; of a flat raster its value, of an empty one zero."""
     provider = layer.dataProvider()
-    return provider.cumulativeCut(1, low, high, layer.extent(), _SAMPLES)
+    low, high = provider.cumulativeCut(1, 0.02, 0.98, layer.extent(), _SAMPLES)
+    if math.isfinite(low) and math.isfinite(high):
+        return low, high
+    statistics = provider.bandStatistics(1)
+    value = statistics.mean if statistics.elementCount else 0.0
+    return value, value
 
 
 def _terrain(layer: QgsRasterLayer) -> None:
-    low, high = _percentiles(layer, 0.02, 0.98)
+    low, high = _range(layer)
     _between(layer, low, high, _TERRAIN)
 
 
 def _sequential(layer: QgsRasterLayer) -> None:
-    low, high = _percentiles(layer, 0.02, 0.98)
+    low, high = _range(layer)
     _between(layer, low, high, _PLAIN)
 
 
 def _difference(layer: QgsRasterLayer) -> None:
     """Red where sand was lost, blue where it was gained, white at zero."""
-    low, high = _percentiles(layer, 0.02, 0.98)
+    low, high = _range(layer)
     reach = max(abs(low), abs(high)) or 1.0
     _between(layer, -reach, reach, _DIVERGING)
 
@@ -97,7 +105,11 @@ def _arrows(layer: QgsVectorLayer) -> None:
     arrow.setXAttribute("dE")
     arrow.setYAttribute("dN")
     arrow.setScale(_LONGEST / longest if longest > 0.0 else 1.0)
-    arrow.setColor(QColor("#b2182b"))
+    shaft = {"color": "#b2182b", "arrow_width": "0.4", "arrow_start_width": "0.4", "head_length": "1.6", "head_thickness": "1.0"}
+    line = QgsLineSymbol()
+    line.changeSymbolLayer(0, QgsArrowSymbolLayer.create({**shaft, "is_curved": "0", "outline_style": "no"}))
+    line.setColor(QColor("#b2182b"))
+    arrow.setSubSymbol(line)
     symbol = QgsMarkerSymbol.createSimple({"name": "circle", "color": "#222222", "size": "1.6"})
     symbol.appendSymbolLayer(arrow)
     layer.setRenderer(QgsSingleSymbolRenderer(symbol))

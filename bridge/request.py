@@ -21,9 +21,9 @@ Values = Dict[str, Any]
 
 
 def is_given(parameters: Values, definition: QgsProcessingParameterDefinition) -> bool:
-    """Tell whether the user, or the default, gives a value."""
-    value = parameters.get(definition.name(), definition.defaultValue())
-    return value is not None and value != ""
+    """Tell whether the user, or the default, gives a value; None stands for the default, as everywhere in Processing."""
+    value = parameters.get(definition.name())
+    return (definition.defaultValue() if value is None else value) not in (None, "")
 
 
 def rasters(algorithm: QgsProcessingAlgorithm, parameters: Values, context: QgsProcessingContext) -> Values:

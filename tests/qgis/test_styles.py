@@ -1,0 +1,98 @@
+"""How results look when QGIS loads them."""
+
+import math
+import struct
+
+import pytest
+
+
+def make_raster(path, values):
+    from osgeo import gdal, osr
+
+    data = gdal.GetDriverByName("GTiff").Create(str(path), len(values[0]), len(values), 1, gdal.GDT_Float32)
+    data.SetGeoTransform((500000, 1, 0, 5000000, 0, -1))
+    reference = osr.SpatialReference()
+    reference.ImportFromEPSG(32631)
+    data.SetProjection(reference.ExportToWkt())
+    band = data.GetRasterBand(1)
+    band.SetNoDataValue(-9999)
+    for row, line in enumerate(values):
+        band.WriteRaster(0, row, len(line), 1, struct.pack(f"{len(line)}f", *line), buf_type=gdal.GDT_Float32)
+    del band, data
+
+
+def drawn(path, style):
+    from qgis.core import QgsRasterLayer
+
+    layer = QgsRasterLayer(str(path), "layer")
+    style.postProcessLayer(layer, None, None)
+    return layer
+
+
+def ramp(layer):
+    return layer.renderer().shader().rasterShaderFunction().colorRampItemList()
+
+
+def test_a_difference_is_white_at_zero_red_below_blue_above(qgis, tmp_path):
+    from strandline.algorithms import styles
+
+    make_raster(tmp_path / "d.tif", [[-2.0] * 20, [0.5] * 20, [0.0] * 20, [-9999.0] * 20])
+    items = ramp(drawn(tmp_path / "d.tif", styles.DIFFERENCE))
+    values = [item.value for item in items]
+    assert values == pytest.approx([-v for v in reversed(values)])
+    assert values[0] == pytest.approx(-2.0, abs=0.02)  # the histogram's step
+    middle = items[len(items) // 2]
+    assert middle.value == pytest.approx(0.0, abs=1e-9)
+    assert middle.color.red() == middle.color.green() == middle.color.blue() > 240
+    assert items[0].color.red() > items[0].color.blue()
+    assert items[-1].color.blue() > items[-1].color.red()
+
+
+@pytest.mark.parametrize("values", [[[1.0, 1.0], [1.0, 1.0]], [[-9999.0, -9999.0], [-9999.0, -9999.0]]])
+def test_a_flat_or_empty_raster_is_drawn_too(qgis, tmp_path, values):
+    from strandline.algorithms import styles
+
+    make_raster(tmp_path / "r.tif", values)
+    for style in (styles.TERRAIN, styles.DIFFERENCE, styles.SEQUENTIAL):
+        found = [item.value for item in ramp(drawn(tmp_path / "r.tif", style))]
+        assert found == sorted(found)
+        assert all(map(math.isfinite, found))
+        assert found[0] < found[-1]
+
+
+def test_residuals_are_arrows_of_a_centimetre_at_most(qgis):
+    from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
+    from strandline.algorithms import styles
+
+    layer = QgsVectorLayer("Point?crs=EPSG:32631&field=name:string&field=dE:double&field=dN:double", "residuals", "memory")
+    for name, east, north in (("G1", 0.03, -0.04), ("G2", 0.01, 0.0), ("G3", None, None)):
+        feature = QgsFeature(layer.fields())
+        feature.setAttributes([name, east, north])
+        feature.setGeometry(QgsGeometry.fromWkt("POINT (1 2)"))
+        layer.dataProvider().addFeature(feature)
+    styles.RESIDUALS.postProcessLayer(layer, None, None)
+    arrow = layer.renderer().symbol().symbolLayer(1)
+    assert (arrow.xAttribute(), arrow.yAttribute()) == ("dE", "dN")
+    assert arrow.scale() * 0.05 == pytest.approx(10.0)
+
+
+def test_a_result_that_is_to_be_loaded_gets_its_style(algorithm, fake_engine, tmp_path):
+    from qgis.core import QgsProcessingContext, QgsProcessingFeedback, QgsProcessingOutputLayerDefinition, QgsProject
+    from strandline.algorithms import styles
+
+    (tmp_path / "survey.json").write_text("{}")
+    fake_engine("say(type='result', result={'output': request['output'], 'precision': request['precision']})")
+    dsm, precision = tmp_path / "dsm.tif", tmp_path / "precision.tif"
+    context = QgsProcessingContext()
+    context.setProject(QgsProject.instance())
+    parameters = {
+        "SURVEY": str(tmp_path),
+        "OUTPUT": QgsProcessingOutputLayerDefinition(str(dsm), QgsProject.instance()),
+        "PRECISION": QgsProcessingOutputLayerDefinition(str(precision), QgsProject.instance()),
+    }
+    results, fine = algorithm("exportdsm").run(parameters, context, QgsProcessingFeedback())
+    assert fine
+    assert results["OUTPUT"] == str(dsm)
+    assert set(context.layersToLoadOnCompletion()) == {str(dsm), str(precision)}
+    assert context.layerToLoadOnCompletionDetails(str(dsm)).postProcessor() is styles.TERRAIN
+    assert context.layerToLoadOnCompletionDetails(str(precision)).postProcessor() is styles.SEQUENTIAL
