@@ -18,6 +18,7 @@ from .alignment import Aligned, common_grid
 from .coregistration import Method, Shift, fit_shift, statistics
 from .difference import Pair, Sigma, Stable, difference, stable_ground
 from .errormodel import error_model, systematic_error
+from .georeferencing import require_one_reference
 from .heights import Heights, open_heights
 from .report import Findings, write_report
 from .units import true_area
@@ -85,6 +86,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             for source, label, start in ((request.before, "BEFORE", 0.0), (request.after, "AFTER", 0.1))
         ]
         before, after = heights
+        require_one_reference(before.file.tags, after.file.tags)
         grid, shared = common_grid(before, after)
         _, areas = true_area(grid.crs, *shapely.get_coordinates(shapely.point_on_surface(shared))[0])
         if areas:

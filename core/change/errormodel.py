@@ -9,8 +9,9 @@ import numpy as np
 from ..progress import Progress
 from .coregistration import Shift, plane_design
 from .difference import Stable
+from .georeferencing import Georeferenced, georeferenced
 from .heights import Heights
-from .uncertainty import SAMPLE, ErrorModel, Fitted, Georeferenced, Given, Systematic, fit_covariance, georeferenced
+from .uncertainty import SAMPLE, ErrorModel, Fitted, Given, Systematic, fit_covariance
 from .variogram import Variogram, fit_variogram
 
 

@@ -6,20 +6,15 @@ what remains of a shift that was fitted, or of the georeferencing (Anderson 2019
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contract import decode
-from ..errors import InputError
-from ..frames import LocalFrame, transformer
 from .variogram import pair_sum
 
 Array = NDArray[np.float64]
-GEOREFERENCING = "STRANDLINE_GEOREFERENCING"  # the tag with which a DSM carries its georeferencing's covariance
 SAMPLE = 2500  # cells of a zone whose pairs are summed
 
 
@@ -67,50 +62,6 @@ class Fitted:
         return float(np.sqrt(max(0.0, g @ self.covariance @ g)))
 
 
-@dataclass(frozen=True)
-class _Block:
-    frame: LocalFrame
-    pivot: tuple[float, ...]
-    covariance: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Georeferenced:
-    """The georeferencing of two models of independent flights."""
-
-    before: _Block
-    after: _Block
-    crs: str  # that of x and y
-
-    def sigma(self, x: float, y: float, before: float, after: float) -> float | None:
-        """Return the propagated sigma of both shifts, tilts and scales at the zone's mean place."""
-        variance = sum(
-            _height_variance(block, self.crs, x, y, height) for block, height in ((self.before, before), (self.after, after))
-        )
-        return float(np.sqrt(variance))
-
-
-def georeferenced(label: str, tags: dict[str, str]) -> _Block | None:
-    """Return the georeferencing that a DSM's tags carry, None when they do not.
-
-    Raises
-    ------
-    InputError
-        When the tag is there but damaged.
-    """
-    text = tags.get(GEOREFERENCING)
-    if not text:
-        return None
-    try:
-        data = json.loads(text)
-        block = decode(_Block, {key: data[key] for key in ("frame", "pivot", "covariance")})
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{label}: the tag {GEOREFERENCING} is damaged ({error}): export the DSM again.") from error
-    if len(block.covariance) != 49 or len(block.pivot) != 3:
-        return None
-    return block
-
-
 def correlated_variance(sample: Array, count: int, squares: float, reach: float) -> float:
     """Return sum_i sum_k s_i s_k rho(d_ik) over the ``count`` cells of a zone, from a random sample of them.
 
@@ -151,12 +102,3 @@ def total(*parts: float | None) -> float | None:
     """Return the root sum of squares; None when a part is not known."""
     known = [p for p in parts if p is not None]
     return float(np.sqrt(sum(p * p for p in known))) if len(known) == len(parts) else None
-
-
-def _height_variance(block: _Block, crs: str, x: float, y: float, height: float) -> float:
-    x, y = transformer(crs, block.frame.crs).transform(x, y)
-    local = block.frame.from_crs(np.array([[x, y, height]]))[0]
-    east, north, up = local - np.asarray(block.pivot)
-    # Shift up; a rotation w moves a point by w x r, whose upward part is w_E r_N - w_N r_E; scale lifts by r_U.
-    g = np.array([0.0, 0.0, 1.0, north, -east, 0.0, up])
-    return float(max(0.0, g @ np.reshape(block.covariance, (7, 7)) @ g))
