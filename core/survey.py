@@ -100,7 +100,7 @@ class Survey:
         """
         path = Path(folder) / _FILE
         if not path.is_file():
-            raise InputError(f"{folder} is not a survey folder (no {_FILE} in it): make one with 'Create survey'.")
+            raise _no_survey(folder)
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
             version = data["version"]
@@ -234,16 +234,21 @@ class Survey:
 
 
 @contextmanager
-def held(folder: Path | str, step: str) -> Iterator[None]:
+def held(folder: Path | str, step: str, *, make: bool = False) -> Iterator[None]:
     """Hold the survey folder as its only writer; the system lets go of it when this process ends, however it ends.
+
+    ``make`` makes the folder where there is none.
 
     Raises
     ------
     InputError
-        When another process holds the survey; the message names it.
+        When there is no such folder, or another process holds the survey; the message names it.
     """
     target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
+    if make:
+        target.mkdir(parents=True, exist_ok=True)
+    elif not target.is_dir():
+        raise _no_survey(target)
     with (target / _LOCK).open("a+", encoding="utf-8") as stream:
         try:
             _lock(stream)
@@ -287,6 +292,10 @@ def verify(path: Path, photograph: Photograph) -> None:
     """
     if file_digest(path) != photograph.digest:
         raise InputError(f"The photograph {path} has changed since the survey was made: run 'Create survey' again.")
+
+
+def _no_survey(folder: Path | str) -> InputError:
+    return InputError(f"{folder} is not a survey folder (no {_FILE} in it): make one with 'Create survey'.")
 
 
 def _is_inside(name: str) -> bool:

@@ -86,7 +86,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         progress.info(f"{count} photographs: {camera}.")
 
     definition = crs.to_wkt() if crs else None
-    with held(output, "createsurvey"):
+    with held(output, "createsurvey", make=True):
         if positions and request.photos:
             _write_photos(request.photos, photographs)
         survey = Survey.create(output, images, definition, photographs)

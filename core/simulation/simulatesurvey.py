@@ -93,7 +93,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
 
     _remove_abandoned(output)
     with whole(output) as part:
-        with held(part, "simulatesurvey"):
+        with held(part, "simulatesurvey", make=True):
             result = produce(request, _beach(request), part, progress)
         (part / "survey.lock").unlink()
         files = {p.relative_to(part).as_posix(): p.stat().st_size for p in sorted(part.rglob("*")) if p.is_file()}
