@@ -190,10 +190,11 @@ class _Heard:
     """A listener that passes everything on and remembers the warnings, for the report."""
 
     def __init__(self, progress: Progress) -> None:
-        self._progress, self.warnings = progress, list[str]()
+        self._progress, self._done, self.warnings = progress, 0.0, list[str]()
 
     def fraction(self, value: float) -> None:
-        self._progress.at(value)
+        self._done = max(self._done, value)  # a raster with an undeclared no-data value is read again
+        self._progress.at(self._done)
 
     def message(self, text: str, *, warning: bool) -> None:
         if warning:

@@ -12,7 +12,8 @@ import pytest
 import shapely
 from strandline.core.change.dsmdifference import Request, run
 from strandline.core.contract import RasterSource, VectorSource
-from strandline.core.errors import InputError, NotEnoughData
+from strandline.core.errors import Cancelled, InputError, NotEnoughData
+from strandline.core.progress import Progress
 
 WEST, NORTH = 300_000.0, 5_774_000.0
 FOOT = 1200 / 3937
@@ -522,6 +523,70 @@ def test_the_same_again(step, make_raster, read_raster):
     content = Path(first.output).read_bytes()
     assert step(*pair, **options) == first
     assert Path(first.output).read_bytes() == content
+
+
+def test_tiles_do_not_show(step, make_raster, make_polygons, read_raster, monkeypatch, tmp_path):
+    """Tiles of 1,024 and of 17 cells: the same rasters to the bit, the same numbers to rounding."""
+    from strandline.core.change import difference
+
+    random = np.random.default_rng(12)
+    before, after = random.normal(5, 0.1, (70, 90)), random.normal(5.05, 0.1, (70, 90))
+    after[20:30, 20:40] = np.nan
+    pair = make_raster("b", before), make_raster("a", after, west=WEST + 0.4, north=NORTH + 0.7)
+    zones = make_polygons("zones", [shapely.Point(30, -30).buffer(25), shapely.Point(60, -40).buffer(20)])
+    options = {"zones": zones, "before_sigma": 0.1, "after_sigma": 0.1, "correlation_range": 9.0, "lod": "coherent"}
+    options |= {"significant": str(tmp_path / "s.tif"), "stable": make_polygons("stable", [shapely.box(0, -70, 90, -50)])}
+    large = step(*pair, **options)
+    rasters = [read_raster(path)[0] for path in (large.output, large.significant)]
+
+    def small(grid, reach, halo=0):
+        corners = [(c, r) for r in range(0, grid.height, 17) for c in range(0, grid.width, 17)]
+        return [(c, r, min(17, grid.width - c), min(17, grid.height - r)) for c, r in corners]
+
+    monkeypatch.setattr(difference, "tiles", small)
+    tiled = step(*pair, **options)
+    for path, expected in zip((tiled.output, tiled.significant), rasters, strict=True):
+        np.testing.assert_array_equal(read_raster(path)[0], expected)
+    for name in (
+        "net",
+        "net_sigma",
+        "net_correlated",
+        "erosion",
+        "deposition_sigma",
+        "deposition_significant",
+        "covered_percent",
+    ):
+        assert getattr(tiled, name) == pytest.approx(getattr(large, name), rel=1e-9)
+
+
+def test_cancelled_half_way(make_raster, tmp_path):
+    """The output of an earlier run stays, and nothing else."""
+
+    class Impatient:
+        def __init__(self, patience):
+            self.patience, self.last = patience, 0.0
+
+        def fraction(self, value):
+            assert value >= self.last
+            self.last = value
+
+        def message(self, text, *, warning):
+            pass
+
+        def cancelled(self):
+            return self.last > self.patience
+
+    values = np.add.outer(np.arange(1100.0), np.arange(1100.0))
+    pair = make_raster("b", values), make_raster("a", values + 1)
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "change.tif").write_bytes(b"earlier")
+    for patience in (0.05, 0.4, 0.6):
+        listener = Impatient(patience)
+        with pytest.raises(Cancelled):
+            run(Request(*pair, str(folder / "change.tif"), volumes=str(folder / "v.gpkg")), Progress(listener))
+        assert [p.name for p in folder.iterdir()] == ["change.tif"]
+        assert (folder / "change.tif").read_bytes() == b"earlier"
 
 
 def test_full_sigma_covers_the_truth(step, make_raster, make_polygons):
