@@ -28,7 +28,7 @@ class Gnss:
     """Antenna positions: ``view`` (n,) indexes the block's views, ``coordinates`` (n, 3) are in the survey's CRS.
 
     ``sigmas`` (n, 2) are in plan and height (m); ``declared`` tells whether the files gave them. ``lever`` (3,) leads from
-    the projection centre to the antenna: right, forward, up of the levelled flight frame (m).
+    the projection centre to the antenna: right, forward, up of the levelled flight frame (m). ``notes`` says what was set aside.
     """
 
     view: NDArray[np.int64]
@@ -36,6 +36,7 @@ class Gnss:
     sigmas: Array
     declared: bool
     lever: Array
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Return the number of positions."""
@@ -55,15 +56,23 @@ def gnss_of(views: Sequence[View], photographs: Sequence[Photograph], crs: str, 
         When LEVER_ARM is not three numbers.
     """
     by_name = {p.name: p.position for p in photographs}
-    found = [(i, p) for i, v in enumerate(views) if (p := by_name.get(v.name)) is not None and p.height is not None]
-    declared = bool(found) and all(p.sigma_h is not None and p.sigma_v is not None for _, p in found)
+    placed = [(i, p) for i, v in enumerate(views) if (p := by_name.get(v.name)) is not None]
+    found = [(i, p) for i, p in placed if p.height is not None]
+    told = sum(p.sigma_h is not None and p.sigma_v is not None for _, p in found)
+    declared = bool(found) and told == len(found)
+    notes = []
+    if len(found) < len(placed):
+        notes.append(f"{len(placed) - len(found)} of {len(placed)} GNSS positions have no height and are not used.")
+    if 0 < told < len(found):
+        notes.append(f"Only {told} of {len(found)} GNSS positions tell their sigma: all are taken as telling none.")
     sigmas = np.array([[p.sigma_h, p.sigma_v] if declared else SCATTER for _, p in found], float).reshape(-1, 2)
     coordinates = np.zeros((len(found), 3))
     if found:
         to_crs = transformer("EPSG:4326", CRS.from_user_input(crs))
         coordinates[:, 0], coordinates[:, 1] = to_crs.transform([p.longitude for _, p in found], [p.latitude for _, p in found])
         coordinates[:, 2] = [p.height for _, p in found]
-    return Gnss(np.array([i for i, _ in found], np.int64), coordinates, sigmas, declared, _lever(lever_arm))
+    views_found = np.array([i for i, _ in found], np.int64)
+    return Gnss(views_found, coordinates, sigmas, declared, _lever(lever_arm), tuple(notes))
 
 
 def antenna_offsets(views: Sequence[View], gnss: Gnss, similarity: Similarity) -> Array:

@@ -75,7 +75,7 @@ def gather(request: Request, survey: Survey, given: Given | None, block: Block) 
         )
     photographs = survey.photographs if request.use_gnss else ()
     gnss = gnss_of(block.views, photographs, crs, request.lever_arm)
-    warnings = list(control.notes)
+    warnings = [*control.notes, *gnss.notes]
     plan = plan_heights(
         request.gcp_heights,
         request.gnss_heights,

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 HUBER_HEIGHT, HUBER_PLAN = 1.345, 1.855
 _GAUSS_MAD = 0.6744897501960817
 _START_TRIPLES = 300
+_LEAST_FACTOR = 1e-6  # a thousandth of the given sigmas; keeps exact points solvable
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ def fit(
         if redundancy >= 3:
             lengths, whitened = _standardised(wanted, total)
             if iteration < 20:  # later it stands, so that the weights can settle
-                spread = max(_spread(whitened, 3 * n - redundancy), 1.0 if trust else 1e-9)
+                spread = max(_spread(whitened, 3 * n - redundancy), 1.0 if trust else _LEAST_FACTOR**0.5)
             weights = _huber(lengths / spread)
         root = np.sqrt(weights[:, [0, 0, 1]])
         weight = root[:, :, None] * np.linalg.inv(total) * root[:, None, :]
@@ -170,7 +171,7 @@ def fit(
     residuals = similarity.apply(model) - ground
     lengths, whitened = _standardised(-residuals - member * error, total)
     estimated = _variance_factor(whitened, weights, lengths / spread, redundancy, error, shared) if redundancy > 0 else None
-    factor = max(1.0, estimated or 0.0) if trust else (estimated if estimated is not None else 1.0)
+    factor = max(1.0, estimated or 0.0) if trust else (1.0 if estimated is None else max(estimated, _LEAST_FACTOR))
     # The prior of the shared error is a statement of its own that the residuals say nothing about.
     inverse = _solve((normal - prior) / factor + prior, np.eye(10))
     return Fit(similarity, pivot, inverse[:7, :7], factor, estimated, redundancy, residuals, weights, error)

@@ -406,6 +406,40 @@ def test_a_focal_length_gone_astray_is_called_out(tmp_path):
     assert np.sqrt(covariance[2, 2]) == pytest.approx(0.2 * HEIGHT, rel=0.1)
 
 
+def test_positions_that_tell_less_are_counted(tmp_path):
+    scene = Scene(tmp_path, gnss_sigma=0.03)
+    photographs = list(scene.survey.photographs)
+    photographs[0] = replace(photographs[0], position=replace(photographs[0].position, height=None))
+    photographs[1] = replace(photographs[1], position=replace(photographs[1].position, sigma_v=None))
+    survey = Survey.create(tmp_path / "survey", tmp_path, scene.survey.crs, photographs)
+    survey.finish("orient", "1", built_on=(), parameters={}, result={})
+    run(scene.request([], gnss=True))
+    assert "1 of 10 GNSS positions have no height" in scene.report()
+    assert "Only 8 of 9 GNSS positions tell their sigma" in scene.report()
+
+
+def test_without_a_crs_of_its_own_the_survey_takes_the_controls(tmp_path):
+    scene = Scene(tmp_path, mark_noise=0.0)
+    survey = Survey.create(tmp_path / "survey", tmp_path, None, [replace(p, position=None) for p in scene.survey.photographs])
+    survey.finish("orient", "1", built_on=(), parameters={}, result={})
+    run(scene.request())
+    assert np.abs(scene.errors()).max() < 1e-4
+    with pytest.raises(InputError, match="has no CRS"):
+        run(scene.request([]))
+
+
+def test_another_crs_than_the_surveys(tmp_path):
+    scene = Scene(tmp_path, mark_noise=0.0)
+    run(scene.request(crs="EPSG:2154"))
+    frame = Georef.read(Survey.open(tmp_path / "survey")).frame
+    assert "Lambert-93" in frame.crs
+    model = pycolmap.Reconstruction(tmp_path / "survey" / FOLDER)
+    points = frame.to_crs(np.array([model.points3D[key].xyz for key in sorted(model.points3D)]))
+    expected = FRAME.to_crs(scene.points)
+    expected[:, 0], expected[:, 1] = transformer(UTM, "EPSG:2154").transform(expected[:, 0], expected[:, 1])
+    assert np.abs(points - expected).max() < 1e-3
+
+
 def test_a_wrong_position_is_named(tmp_path):
     scene = Scene(tmp_path, gnss_noise=0.1)
     photographs = list(scene.survey.photographs)
