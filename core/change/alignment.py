@@ -98,6 +98,15 @@ def common_grid(before: Heights, after: Heights) -> tuple[Grid, Any]:
     return _over(coarser, shapely.bounds(shared)), shared
 
 
+def link_accuracy(before: Heights, after: Heights) -> float:
+    """Return how well (m) PROJ knows the transformation between the two models' CRS at the models; 0 for one datum."""
+    change = _change(before.units.crs, after.units.crs)
+    if change is None:
+        return 0.0
+    change.transform(*shapely.get_coordinates(shapely.centroid(footprint(before, before.units.crs)))[0])
+    return max(0.0, float(change.get_last_used_operation().accuracy))
+
+
 def footprint(heights: Heights, crs: str) -> Any:
     """Return the polygon in ``crs`` that the model's raster covers."""
     width, height = heights.file.width, heights.file.height

@@ -14,7 +14,7 @@ from ..contract import RasterSource, VectorSource
 from ..errors import InputError
 from ..progress import SILENT, Progress
 from ..raster import check_destination
-from .alignment import Aligned, common_grid
+from .alignment import Aligned, common_grid, link_accuracy
 from .coregistration import Method, Shift, fit_shift, statistics
 from .difference import Pair, Sigma, Stable, difference, stable_ground
 from .errormodel import error_model, systematic_error
@@ -25,6 +25,8 @@ from .units import true_area
 from .volumes import Volume
 from .volumetable import write_volumes
 from .zones import Zone, read_zones, union
+
+_LINK = 0.1  # metres between two datums that are worth a warning
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,11 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         before, after = heights
         require_one_reference(before.file.tags, after.file.tags)
         grid, shared = common_grid(before, after)
+        if (accuracy := link_accuracy(before, after)) > _LINK:
+            progress.warn(
+                f"The datums of BEFORE and AFTER are linked to {accuracy:g} m only: one may lie that far beside the other; "
+                "put both in the CRS in which they were surveyed."
+            )
         _, areas = true_area(grid.crs, *shapely.get_coordinates(shapely.point_on_surface(shared))[0])
         if areas:
             progress.warn(areas)
@@ -102,8 +109,8 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             progress.warn("BEFORE and AFTER are the same file: there is no change to see.")
 
         precisions = [
-            open_heights(source, label, None, progress.part(0.2, 0.25)) if source else None
-            for source, label in ((request.before_precision, "BEFORE_PRECISION"), (request.after_precision, "AFTER_PRECISION"))
+            open_heights(source, f"{label}_PRECISION", None, progress.part(start, start + 0.025)) if source else None
+            for source, label, start in ((request.before_precision, "BEFORE", 0.2), (request.after_precision, "AFTER", 0.225))
         ]
         for precision in precisions:
             if precision:

@@ -310,6 +310,16 @@ class TestInputs:
         assert result.net / covered == pytest.approx(0.25, abs=1e-4)
         assert result.erosion == 0.0
 
+    def test_datums_that_are_loosely_linked(self, step, make_raster, listener):
+        """NAD 83 and WGS 84 are known to each other to metres only."""
+        options = {"west": 500_000.0, "north": 4_000_000.0}
+        before = make_raster("b", self.BEFORE, crs="EPSG:26911", **options)
+        step(before, make_raster("a", self.BEFORE + 1, crs="EPSG:32611", **options))
+        assert any("linked to 4 m only" in w for w in listener.warnings)
+        listener.warnings.clear()
+        step(before, make_raster("a", self.BEFORE + 1, crs="EPSG:26911", **options))
+        assert not any("linked" in w for w in listener.warnings)
+
     def test_finer_raster_is_averaged(self, step, make_raster, read_raster):
         random = np.random.default_rng(1)
         fine = random.normal(10, 1, (48, 40))
