@@ -35,7 +35,7 @@ strings: ## collect the words to translate into i18n/*.ts
 	$(QGIS_PYTHON) scripts/strings.py
 
 models: setup ## make models/*.model3 again from scripts/build_models.py
-	$(QGIS_ENV) $(QGIS_PYTHON) scripts/build_models.py
+	QT_HASH_SEED=0 $(QGIS_ENV) $(QGIS_PYTHON) scripts/build_models.py
 
 package: ## the plugin as a zip in dist/, to install from QGIS's plugin manager
 	$(QGIS_PYTHON) scripts/package.py

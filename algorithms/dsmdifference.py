@@ -8,13 +8,13 @@ from qgis.core import QgsProcessingContext, QgsProcessingOutputDefinition, QgsPr
 from ..i18n import tr
 from . import parameters as ask
 from .base import About, StepAlgorithm
-from .styles import DIFFERENCE
+from .styles import DIFFERENCE, ZONES
 
 
 class DsmDifference(StepAlgorithm):
     """The algorithm ``strandline:dsmdifference``."""
 
-    STYLES = {"OUTPUT": DIFFERENCE, "SIGNIFICANT": DIFFERENCE}
+    STYLES = {"OUTPUT": DIFFERENCE, "SIGNIFICANT": DIFFERENCE, "VOLUMES": ZONES}
 
     def about(self) -> About:
         """Return what the algorithm is called and does."""

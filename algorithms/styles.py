@@ -11,8 +11,10 @@ from typing import Any, Callable, List, Tuple
 from qgis.core import (
     QgsArrowSymbolLayer,
     QgsColorRampShader,
+    QgsFillSymbol,
     QgsLineSymbol,
     QgsMarkerSymbol,
+    QgsPalLayerSettings,
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingLayerPostProcessorInterface,
@@ -20,12 +22,16 @@ from qgis.core import (
     QgsRasterShader,
     QgsSingleBandPseudoColorRenderer,
     QgsSingleSymbolRenderer,
+    QgsTextBufferSettings,
+    QgsTextFormat,
     QgsVectorFieldSymbolLayer,
     QgsVectorLayer,
+    QgsVectorLayerSimpleLabeling,
 )
 from qgis.PyQt.QtGui import QColor
 
 _SAMPLES = 250_000  # cells looked at for a range: enough for percentiles, quick on any raster
+_NET = "format_number(\"net\", 1) || coalesce(' ± ' || format_number(\"sigma\", 1), '') || ' m³'"
 _LONGEST = 10.0  # millimetres on the map, the symbol's unit
 _TERRAIN = ("#22577a", "#e9d8a6", "#d9b26f", "#a9b665", "#6a994e", "#9c7a4d", "#f2efe9")
 _DIVERGING = ("#b2182b", "#ef8a62", "#fddbc7", "#f7f7f7", "#d1e5f0", "#67a9cf", "#2166ac")
@@ -122,7 +128,24 @@ def _pairs(layer: QgsVectorLayer, places: List[int]) -> Iterator[List[float]]:
             yield pair
 
 
+def _zones(layer: QgsVectorLayer) -> None:
+    """Draw outlines that leave the difference visible, each with its net volume and deviation."""
+    fill = {"color": "0,0,0,0", "outline_color": "#222222", "outline_width": "0.4"}
+    layer.setRenderer(QgsSingleSymbolRenderer(QgsFillSymbol.createSimple(fill)))
+    label = QgsPalLayerSettings()
+    label.isExpression = True
+    label.fieldName = _NET
+    style = QgsTextFormat()
+    halo = QgsTextBufferSettings()
+    halo.setEnabled(True)
+    style.setBuffer(halo)
+    label.setFormat(style)
+    layer.setLabeling(QgsVectorLayerSimpleLabeling(label))
+    layer.setLabelsEnabled(True)
+
+
 TERRAIN = Style(_terrain)
 SEQUENTIAL = Style(_sequential)
 DIFFERENCE = Style(_difference)
 RESIDUALS = Style(_arrows)
+ZONES = Style(_zones)

@@ -36,7 +36,7 @@ class Builder:
 
     def __init__(self, title, text):
         self.model = QgsProcessingModelAlgorithm(title, "Models", "models")
-        self.model.setHelpContent({"ALG_DESC": text, "ALG_CREATOR": "Strandline"})
+        self._help = {"ALG_DESC": text, "ALG_CREATOR": "Strandline"}
         self._column, self._row = 0, 0
 
     def add(self, step, child_id, title, *, asked=(), wired=None, outputs=None, prefix="", suffix=""):
@@ -73,6 +73,7 @@ class Builder:
 
     def save(self, file):
         """Check the model and write it."""
+        self.model.setHelpContent(self._help)
         self.model.updateDestinationParameters()
         fine, told = self.model.validate()
         if not fine:
@@ -85,6 +86,7 @@ class Builder:
         """Make an input like ``definition`` unless there is one; return its name."""
         name, label = f"{prefix}{definition.name()}", f"{definition.description()}{suffix}"
         if self.model.parameterDefinition(name) is None:
+            self._help[name] = definition.help()
             copy = definition.clone()
             copy.setName(name)
             copy.setDescription(label)

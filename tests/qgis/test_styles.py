@@ -76,6 +76,26 @@ def test_residuals_are_arrows_of_a_centimetre_at_most(qgis):
     assert arrow.scale() * 0.05 == pytest.approx(10.0)
 
 
+def test_zones_are_outlines_labelled_with_their_net_volume(qgis):
+    from qgis.core import QgsExpression, QgsExpressionContext, QgsFeature, QgsVectorLayer
+    from strandline.algorithms import styles
+
+    layer = QgsVectorLayer("Polygon?crs=EPSG:32631&field=net:double&field=sigma:double", "volumes", "memory")
+    styles.ZONES.postProcessLayer(layer, None, None)
+    assert layer.labelsEnabled()
+    assert layer.renderer().symbol().color().alpha() == 0
+    expression = QgsExpression(layer.labeling().settings().fieldName)
+    context = QgsExpressionContext()
+    told = []
+    for row in ([-12.34, 1.5], [3.0, None]):
+        feature = QgsFeature(layer.fields())
+        feature.setAttributes(row)
+        context.setFeature(feature)
+        context.setFields(layer.fields())
+        told.append(expression.evaluate(context))
+    assert told == ["-12.3 ± 1.5 m³", "3.0 m³"]
+
+
 def test_a_result_that_is_to_be_loaded_gets_its_style(algorithm, fake_engine, tmp_path):
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback, QgsProcessingOutputLayerDefinition, QgsProject
     from strandline.algorithms import styles
