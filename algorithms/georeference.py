@@ -53,7 +53,7 @@ class Georeference(StepAlgorithm):
         yield ask.words(
             "LEVER_ARM",
             tr("Lever arm"),
-            tr("From the GNSS antenna to the camera in metres, three numbers: right, forward, up, of the levelled aircraft."),
+            tr("From the camera to the GNSS antenna in metres, three numbers: right, forward, up, of the levelled aircraft."),
         )
         heights = ("ellipsoidal", "orthometric", "unknown")
         yield ask.choice(
@@ -121,7 +121,7 @@ class Georeference(StepAlgorithm):
         yield ask.file(
             "GCP_FILE",
             tr("File of ground points and marks"),
-            tr("Instead of both: a gcp_list.txt of OpenDroneMap, or a file of Metashape or MicMac."),
+            tr("Instead of both: a gcp_list.txt of OpenDroneMap, or markers of Metashape as XML."),
         )
         yield ask.words("CHECK", tr("Check points"), tr("Names of ground points that shall only check, separated by commas."))
         yield ask.number("SIGMA_MARK", tr("Accuracy of the marks (px)"), tr("Standard deviation of a mark."), default=0.5)

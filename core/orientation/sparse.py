@@ -41,7 +41,7 @@ def block_from_model(model: pycolmap.Reconstruction) -> Block:
         views.append(
             View(image.name, cameras[image.camera_id], np.asarray(pose.rotation.matrix()), np.array(pose.translation, float))
         )
-    points = list(model.points3D.values())
+    points = [model.points3D[key] for key in sorted(model.points3D)]
     observed = [(n, index_of[e.image_id]) for n, p in enumerate(points) for e in p.track.elements]
     pairs = np.array(observed, np.int32).reshape(-1, 2)
     return Block(
