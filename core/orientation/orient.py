@@ -163,7 +163,7 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
         image_ids=ids,
         limit=limit,
         missing=missing,
-        others=[sorted(m.images[i].name for i in m.reg_image_ids()) for m in models[1:]],
+        others=_apart([{m.images[i].name for i in m.reg_image_ids()} for m in models[1:]], set(missing)),
         link=link,
         sigmas=sigmas,
         fixed=fixed,
@@ -177,6 +177,17 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
         "mmtp_percent": statistics.mmtp_percent,
         "mse": statistics.mse,
     }
+
+
+def _apart(others: list[set[str]], missing: set[str]) -> list[list[str]]:
+    """Return the photographs of each smaller model that the block lacks, each named once."""
+    result = []
+    for names in others:
+        left = names & missing
+        missing = missing - left
+        if len(left) > 1:
+            result.append(sorted(left))
+    return result
 
 
 def _drop_weak(model: pycolmap.Reconstruction) -> None:

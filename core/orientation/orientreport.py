@@ -47,8 +47,8 @@ def write_report(survey: Survey, model: pycolmap.Reconstruction, outcome: Orient
     report = Report(
         "Orientation",
         f"{count} of {len(survey.photographs)} photographs are oriented in one block, with {s.mtp:.0f} tie points each on "
-        f"average (MTP), of which {_percent(s.mtp_percent)} are kept; {s.mmtp:.0f} are seen in three or more photographs (MMTP). The "
-        f"residual is {s.mse or 0.0:.2f} pixels (MSE).",
+        f"average (MTP), of which {_percent(s.mtp_percent)} are kept; {s.mmtp:.0f} are seen in three or more photographs (MMTP). "
+        f"The residual is {s.mse or 0.0:.2f} pixels (MSE).",
     )
     if outcome.missing:
         report.warning(f"Not oriented: {', '.join(outcome.missing)}. They share too few tie points with the block.")
@@ -59,8 +59,8 @@ def write_report(survey: Survey, model: pycolmap.Reconstruction, outcome: Orient
         report.warning(outcome.link)
     report.text(
         "The frame is free: its position, direction and scale mean nothing until the block is georeferenced. Residuals are in "
-        f"pixels of the stored photographs; the final filter drops what is beyond {outcome.limit:.2f} pixels ({FILTER:.0f} robust "
-        "sigmas)."
+        f"pixels of the stored photographs; the final filter drops what is beyond {outcome.limit:.2f} pixels "
+        f"({FILTER:.0f} robust sigmas)."
     )
     _cameras(report, model, outcome)
     _residuals(report, model, outcome)
@@ -100,9 +100,9 @@ def _cameras(report: Report, model: pycolmap.Reconstruction, outcome: Orientatio
             ],
         )
     report.text(
-        "Focal lengths and principal point in pixels; a dash is a parameter that was held. The sigmas are formal, from the thinned "
-        "tie points of the first adjustment: they do not know of what all photographs have in common, such as a dome that focal "
-        "length and radial distortion make together."
+        "Focal lengths and principal point in pixels; a dash is a parameter that was held. The sigmas are formal, from the "
+        "thinned tie points of the first adjustment: they do not know of what all photographs have in common, such as a dome "
+        "that focal length and radial distortion make together."
     )
 
 

@@ -27,6 +27,7 @@ from .pairs import Pair, blocks, choose_pairs, pairs_through_others
 from .tiereport import write_report
 
 CACHE = "cache"  # features and matches, so that what is done need not be done again; it may be deleted
+_FEW = 12
 _TRUSTED = 50  # matches from which a pair may tell where a third photograph lies
 
 
@@ -193,9 +194,9 @@ def _pairs(
         paths = {pair: folder / f"{name}.npz" for pair, (name, _) in wanted.items()}
         missing = [pair for pair, path in paths.items() if not path.is_file()]
         calls = ((str(found[i]), str(found[j]), cameras[i], cameras[j], str(paths[i, j]), wanted[i, j][1]) for i, j in missing)
-        for _ in run_calls(
-            _match_files, calls, workers=request.workers, scheduler=request.scheduler, progress=part, total=len(missing)
-        ):
+        # To start workers takes longer than a few pairs.
+        workers = 1 if len(missing) < _FEW and not request.scheduler else request.workers
+        for _ in run_calls(_match_files, calls, workers=workers, scheduler=request.scheduler, progress=part, total=len(missing)):
             pass
         result = {pair: matching.read_matches(path) for pair, path in paths.items()}
         return {pair: m for pair, m in result.items() if len(m.matches)}
