@@ -21,35 +21,48 @@ Integers = NDArray[np.int32]
 BLOCK = 64  # cells per side that are resampled and correlated together: the views of a block stay in the processor's cache
 
 
-@nb.njit(cache=True)
-def _window_sums(a: Floats, b: Floats, row: int, small: int, large: int, line: Floats, near: Floats, far: Floats) -> None:
-    """Sum a*b over the two windows around each column of ``row``; ``near`` and ``far`` have 2 ``large`` columns less."""
-    width = a.shape[1]
-    count = width - 2 * large
-    line[:width] = 0.0
-    for y in range(row - small, row + small + 1):
-        p, q = a[y], b[y]
-        for x in range(width):
-            line[x] += p[x] * q[x]
-    near[:count] = 0.0
-    for k in range(large - small, large + small + 1):
-        for x in range(count):
-            near[x] += line[x + k]
-    if large == small:
-        far[:count] = near[:count]
-        return
-    for y in range(row - large, row - small):
-        p, q = a[y], b[y]
-        e, f = a[2 * row - y], b[2 * row - y]
-        for x in range(width):
-            line[x] += p[x] * q[x] + e[x] * f[x]
-    far[:count] = 0.0
-    for k in range(2 * large + 1):
-        for x in range(count):
-            far[x] += line[x + k]
+@nb.njit(cache=True, error_model="numpy")
+def _add(parts: int, source: Floats, stride: int, out: Floats) -> None:
+    """Write the sums of ``parts`` (3 or 5) values ``stride`` apart, from each place on; the end is left as it is."""
+    n = len(source) - (parts - 1) * stride
+    a, b, c = source, source[stride:], source[2 * stride :]
+    if parts == 3:
+        for i in range(n):
+            out[i] = a[i] + b[i] + c[i]
+    else:
+        d, e = source[3 * stride :], source[4 * stride :]
+        for i in range(n):
+            out[i] = a[i] + b[i] + c[i] + d[i] + e[i]
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, error_model="numpy")
+def _run_sums(size: int, source: Floats, stride: int, out: Floats, scratch: Floats) -> None:
+    """Write the sums of ``size`` (odd) values ``stride`` apart, from each place on; the end is rubbish.
+
+    Sums of sums for 9, the common size. Unlike a running sum this neither carries rounding errors on nor one missing value.
+    """
+    if size == 3 or size == 5:
+        _add(size, source, stride, out)
+    elif size == 9:
+        _add(3, source, stride, scratch)
+        _add(3, scratch, 3 * stride, out)
+    else:
+        _add(3, source, stride, out)
+        for k in range(3, size, 2):
+            n = len(source) - (k + 1) * stride
+            a, b = source[k * stride :], source[(k + 1) * stride :]
+            for i in range(n):
+                out[i] += a[i] + b[i]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _window_sums(half: int, source: Floats, width: int, out: Floats, line: Floats, scratch: Floats) -> None:
+    """Write the sums over the square window that starts at each place of an image, flat, of row length ``width``."""
+    _run_sums(2 * half + 1, source, width, line, scratch)
+    _run_sums(2 * half + 1, line, 1, out, scratch)
+
+
+@nb.njit(cache=True, error_model="numpy")
 def correlate(views: Floats, seen: NDArray[np.bool_], small: int, large: int, noise: float, knee: float, score: Floats) -> None:
     """Score each cell of a plane of resampled ``views`` (m, rows, columns); NaN in them marks "not in this photograph".
 
@@ -58,73 +71,122 @@ def correlate(views: Floats, seen: NDArray[np.bool_], small: int, large: int, no
     counts with v / (v + knee noise) of the mean variance v in it, the large one with the rest: fine where there is texture, wide
     where there is little.
     """
-    m = views.shape[0]
-    height, width = score.shape
-    pairs = m * (m - 1) // 2
+    m, rows, width = views.shape
+    length = rows * width
+    height, inner = score.shape
     f32 = np.float32
+    zero, one, nan = f32(0.0), f32(1.0), f32(np.nan)
     n_near, n_far = f32(1.0 / (2 * small + 1) ** 2), f32(1.0 / (2 * large + 1) ** 2)
     floor, half_way = f32(noise), f32(knee * noise)
-    ones = np.ones((views.shape[1], views.shape[2]), np.float32)
-    line = np.empty(views.shape[2], np.float32)
-    near, far = np.empty(width, np.float32), np.empty(width, np.float32)
-    mean_near, mean_far = np.empty((m, width), np.float32), np.empty((m, width), np.float32)
-    scale_near, scale_far = np.empty((m, width), np.float32), np.empty((m, width), np.float32)
-    rho = np.empty((pairs, width), np.float32)
-    share, known = np.empty(width, np.float32), np.empty(width, np.float32)
-    agreement, partners = np.empty((m, width), np.float32), np.empty((m, width), np.float32)
-    above, below = np.empty(width, np.float32), np.empty(width, np.float32)
+    adaptive = large > small
+    # The small window that is centred like the large one starts this many places later.
+    late = (large - small) * (width + 1)
+    pairs = m * (m - 1) // 2
+    product, line, scratch = np.zeros(length, np.float32), np.zeros(length, np.float32), np.zeros(length, np.float32)
+    near, far = np.zeros(length + late, np.float32), np.zeros(length, np.float32)
+    centred = near[late:]
+    mean_near, mean_far = np.empty((m, length), np.float32), np.empty((m, length), np.float32)
+    scale_near, scale_far = np.empty((m, length), np.float32), np.empty((m, length), np.float32)
+    share, known = np.zeros(length, np.float32), np.zeros(length, np.float32)
+    for i in range(m):
+        flat = views[i].copy().ravel()
+        mf, sf, mn, sn = mean_far[i], scale_far[i], mean_near[i], scale_near[i]
+        open_ = np.zeros(length, np.float32)
+        for y in range(height):
+            for x in range(inner):
+                open_[y * width + x] = one if seen[i, y, x] else nan
+        for p in range(length):
+            product[p] = flat[p] * flat[p]
+        _window_sums(large, flat, width, far, line, scratch)
+        for p in range(length):
+            mf[p] = far[p] * n_far
+        _window_sums(large, product, width, far, line, scratch)
+        for p in range(length):
+            variance = far[p] * n_far - mf[p] * mf[p]
+            variance = variance if variance > zero else (zero if variance <= zero else nan)
+            # 1 or NaN: where the view is hidden or outside, all that it takes part in is NaN.
+            sf[p] = open_[p] / np.sqrt(variance + floor)
+        if adaptive:
+            _window_sums(small, flat, width, near, line, scratch)
+            for p in range(length):
+                mn[p] = centred[p] * n_near
+            _window_sums(small, product, width, near, line, scratch)
+            for p in range(length):
+                variance = centred[p] * n_near - mn[p] * mn[p]
+                variance = variance if variance > zero else zero
+                valid = sf[p] == sf[p]
+                share[p] += variance if valid else zero
+                known[p] += one if valid else zero
+                sn[p] = one / np.sqrt(variance + floor)
+    for p in range(length):
+        share[p] = share[p] / (share[p] + half_way * known[p]) if share[p] > zero else zero
+    rho = np.empty((pairs, length), np.float32)
+    agreement, partners = np.zeros((m, length), np.float32), np.zeros((m, length), np.float32)
+    k = 0
+    for i in range(m):
+        first = views[i].copy().ravel()
+        mf, sf, mn, sn = mean_far[i], scale_far[i], mean_near[i], scale_near[i]
+        for j in range(i + 1, m):
+            second = views[j].copy().ravel()
+            mg, sg, mo, so = mean_far[j], scale_far[j], mean_near[j], scale_near[j]
+            value = rho[k]
+            for p in range(length):
+                product[p] = first[p] * second[p]
+            _window_sums(large, product, width, far, line, scratch)
+            for p in range(length):
+                value[p] = (far[p] * n_far - mf[p] * mg[p]) * sf[p] * sg[p]
+            if adaptive:
+                _window_sums(small, product, width, near, line, scratch)
+                for p in range(length):
+                    fine = (centred[p] * n_near - mn[p] * mo[p]) * sn[p] * so[p]
+                    value[p] += share[p] * (fine - value[p])
+            ai, aj, pi, pj = agreement[i], agreement[j], partners[i], partners[j]
+            for p in range(length):
+                valid = value[p] == value[p]
+                v, n = (value[p] if valid else zero), (one if valid else zero)
+                ai[p] += v
+                aj[p] += v
+                pi[p] += n
+                pj[p] += n
+            k += 1
+    least = f32(0.1)
+    for i in range(m):
+        ai, pi = agreement[i], partners[i]
+        for p in range(length):
+            mean = ai[p] / (pi[p] if pi[p] > zero else one)
+            ai[p] = mean if mean > least else least
+    above, below = share, known
+    above[:] = zero
+    below[:] = zero
+    k = 0
+    for i in range(m):
+        for j in range(i + 1, m):
+            ai, aj, value = agreement[i], agreement[j], rho[k]
+            for p in range(length):
+                valid = value[p] == value[p]
+                weight = ai[p] * aj[p] if valid else zero
+                above[p] += weight * (value[p] if valid else zero)
+                below[p] += weight
+            k += 1
     for y in range(height):
-        row = y + large
-        share[:], known[:] = 0.0, 0.0
-        for i in range(m):
-            _window_sums(views[i], ones, row, small, large, line, near, far)
-            mean_near[i], mean_far[i] = near * n_near, far * n_far
-            _window_sums(views[i], views[i], row, small, large, line, near, far)
-            for x in range(width):
-                variance = max(near[x] * n_near - mean_near[i, x] * mean_near[i, x], f32(0.0))
-                wide = max(far[x] * n_far - mean_far[i, x] * mean_far[i, x], f32(0.0))
-                valid = seen[i, y, x] and far[x] == far[x]
-                share[x] += variance if valid else f32(0.0)
-                known[x] += f32(1.0) if valid else f32(0.0)
-                scale_near[i, x] = f32(1.0) / np.sqrt(variance + floor) if valid else f32(np.nan)
-                scale_far[i, x] = f32(1.0) / np.sqrt(wide + floor)
-        for x in range(width):
-            texture = share[x] / max(known[x], f32(1.0))
-            share[x] = texture / (texture + half_way) if half_way > 0 else f32(1.0)
-        agreement[:], partners[:] = 0.0, 0.0
-        k = 0
-        for i in range(m):
-            for j in range(i + 1, m):
-                _window_sums(views[i], views[j], row, small, large, line, near, far)
-                for x in range(width):
-                    fine = (near[x] * n_near - mean_near[i, x] * mean_near[j, x]) * scale_near[i, x] * scale_near[j, x]
-                    wide = (far[x] * n_far - mean_far[i, x] * mean_far[j, x]) * scale_far[i, x] * scale_far[j, x]
-                    value = wide + share[x] * (fine - wide)
-                    rho[k, x] = value
-                    valid = value == value
-                    agreement[i, x] += value if valid else f32(0.0)
-                    agreement[j, x] += value if valid else f32(0.0)
-                    partners[i, x] += f32(1.0) if valid else f32(0.0)
-                    partners[j, x] += f32(1.0) if valid else f32(0.0)
-                k += 1
-        for i in range(m):
-            for x in range(width):
-                agreement[i, x] = max(agreement[i, x] / max(partners[i, x], f32(1.0)), f32(0.1))
-        above[:], below[:] = 0.0, 0.0
-        k = 0
-        for i in range(m):
-            for j in range(i + 1, m):
-                for x in range(width):
-                    valid = rho[k, x] == rho[k, x]
-                    weight = agreement[i, x] * agreement[j, x] if valid else f32(0.0)
-                    above[x] += weight * rho[k, x] if valid else f32(0.0)
-                    below[x] += weight
-                k += 1
-        for x in range(width):
-            score[y, x] = above[x] / below[x] if below[x] > 0 else f32(np.nan)
+        for x in range(inner):
+            p = y * width + x
+            score[y, x] = above[p] / below[p] if below[p] > zero else nan
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, error_model="numpy")
+def _level(values: Floats) -> np.float32:
+    """Return about the mean of what is not NaN."""
+    total, number = np.float32(0.0), np.float32(0.0)
+    for r in range(0, values.shape[0], 4):
+        for c in range(0, values.shape[1], 4):
+            if values[r, c] == values[r, c]:
+                total += values[r, c]
+                number += np.float32(1.0)
+    return total / number if number > 0 else np.float32(0.0)
+
+
+@nb.njit(cache=True, error_model="numpy")
 def fill_costs(
     pixels: Floats,
     starts: NDArray[np.int64],
@@ -181,7 +243,7 @@ def fill_costs(
                         continue
                     image = pixels[starts[i] : starts[i] + shapes[i, 0] * shapes[i, 1]].reshape((shapes[i, 0], shapes[i, 1]))
                     out = plane[used, : h + 2 * large, : w + 2 * large]
-                    mean = sample(
+                    sample(
                         image,
                         corners[i],
                         matrices[i],
@@ -194,7 +256,7 @@ def fill_costs(
                         d * step,
                         out,
                     )
-                    out -= np.float32(mean)  # sums of squares of large numbers would lose the small variances
+                    out -= _level(out)  # sums of squares of large numbers would lose the small variances
                     chosen[used] = block_seen[i]
                     used += 1
                 if used < 2:

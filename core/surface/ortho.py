@@ -18,10 +18,11 @@ Floats = NDArray[np.float32]
 
 # Views that lean this much more (tangent) than the steepest weigh a third: a narrow blend, for things that moved.
 _BLEND = 0.02
+_HIDDEN = 100.0  # added to the lean of a view that something hides the cell from
 _TAPER = 0.06  # share of the frame over which a photograph fades out towards its edge
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, error_model="numpy")
 def _lean(
     size: Array, matrix: Array, brown: Array, fold2: float, centre: Array, west: float, north: float, cell: float,
     height: Floats, free: NDArray[np.bool_], lean: Floats, fade: Floats,
@@ -34,17 +35,19 @@ def _lean(
             x, z = west + (c + 0.5) * cell, height[r, c]
             px, py = project(matrix, brown, fold2, x, y, z)
             lean[r, c] = np.nan
-            if not free[r, c] or not (px >= 1.0 and py >= 1.0 and px <= size[0] - 1.0 and py <= size[1] - 1.0):
+            if not (px >= 1.0 and py >= 1.0 and px <= size[0] - 1.0 and py <= size[1] - 1.0):
                 continue
             up = centre[2] - z
             if up <= 0.0:
                 continue
-            lean[r, c] = np.sqrt((centre[0] - x) ** 2 + (centre[1] - y) ** 2) / up
+            # Where every view is hidden the steepest still paints: a wrong shadow is better to look at than a hole.
+            hidden = 0.0 if free[r, c] else _HIDDEN
+            lean[r, c] = np.sqrt((centre[0] - x) ** 2 + (centre[1] - y) ** 2) / up + hidden
             edge = min(min(px, size[0] - px) / size[0], min(py, size[1] - py) / size[1])
             fade[r, c] = min(edge / _TAPER, 1.0)
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, error_model="numpy")
 def _add(
     picture: NDArray[Any], scale: float, matrix: Array, brown: Array, fold2: float, west: float, north: float, cell: float,
     height: Floats, weight: Floats, colour: Floats, total: Floats,

@@ -20,7 +20,9 @@ _SLOPE = 1.5
 DIRECTIONS = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
 
 
-@nb.njit(cache=True)
+@nb.njit(
+    cache=True, error_model="numpy", fastmath={"nnan", "nsz"}
+)  # costs are never NaN, and only so is a minimum found in vector registers
 def aggregate(
     costs: Floats,
     offset: Places,
@@ -77,19 +79,20 @@ def aggregate(
                 for k in range(max(leave, enter), n + 2):
                     line[k] = jump
                 for k in range(n):
-                    value = min(line[k], line[k + 2]) + p1
-                    value = min(min(value, line[k + 1]), jump)
+                    value = (line[k] if line[k] < line[k + 2] else line[k + 2]) + p1
+                    value = value if value < line[k + 1] else line[k + 1]
+                    value = value if value < jump else jump
                     here[k] = costs[o + k] + (value - least)
             low = here[0]
             for k in range(n):
-                low = min(low, here[k])
+                low = here[k] if here[k] < low else low
                 total[o + k] += here[k]
             least_now[c] = low
         before, now = now, before
         least_before, least_now = least_now, least_before
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, error_model="numpy")
 def decide(
     costs: Floats, total: Floats, offset: Places, first: Integers, count: Integers, base: Floats, step: float
 ) -> tuple[Floats, Floats, Floats, Floats]:
