@@ -125,10 +125,11 @@ class StepAlgorithm(QgsProcessingAlgorithm):
         """Send the request, wait for the result, hand it over."""
         folder = Path(tempfile.mkdtemp(prefix="strandline-layers-"))
         try:
+            python = find_python()
             request = {**build(self, parameters, context, folder, feedback), **self._rasters}
             if "scheduler" in request:
                 request["scheduler"] = request["scheduler"] or settings.read(settings.SCHEDULER) or None
-            result = run_step(find_python(), self.name(), request, feedback)
+            result = run_step(python, self.name(), request, feedback)
             return self._outputs(result, request, parameters, context, folder, feedback)
         except (LayerError, EngineError, MissingEngine) as error:
             raise QgsProcessingException(str(error)) from error

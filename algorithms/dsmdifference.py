@@ -84,7 +84,7 @@ class DsmDifference(StepAlgorithm):
         yield ask.raster_output("OUTPUT", tr("Difference"), tr("After minus before in metres."), optional=False)
         yield ask.raster_output("SIGNIFICANT", tr("Significant difference"), tr("The difference where it is significant."))
         yield ask.polygon_output("VOLUMES", tr("Volumes"), tr("The zones with their volumes in m3 and their deviations."))
-        yield ask.report()
+        yield ask.report(kept=False)
 
     def _uncertainty(self) -> Iterable[QgsProcessingParameterDefinition]:
         text = tr("Standard deviation of each height in metres, from 'Export DSM'.")

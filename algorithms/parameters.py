@@ -175,11 +175,11 @@ def polygon_output(key: str, label: str, text: str) -> _Parameter:
     return explained(QgsProcessingParameterFeatureSink(key, label, _POLYGONS, None, True, True), text)
 
 
-def report() -> _Parameter:
-    """Return the step's report."""
-    text = tr(
-        "A page with the step's numbers and pictures, to keep or send. One is always written to the survey's report folder."
-    )
+def report(*, kept: bool = True) -> _Parameter:
+    """Return the step's report; ``kept`` tells that the survey keeps one in any case."""
+    text = tr("A page with the step's numbers and pictures, to keep or send.")
+    if kept:
+        text = f"{text} {tr('One is always written to the report folder of the survey.')}"
     return file_output("OUTPUT_HTML_FILE", tr("Report"), text, filters=tr("HTML files (*.html)"), by_default=True)
 
 

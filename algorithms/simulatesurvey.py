@@ -71,7 +71,7 @@ class SimulateSurvey(StepAlgorithm):
         )
         yield ask.workers()
         yield ask.scheduler()
-        yield ask.report()
+        yield ask.report(kept=False)
 
     def outputs(self) -> Iterable[QgsProcessingOutputDefinition]:
         """Return the truth in numbers."""

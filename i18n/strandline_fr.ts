@@ -4,1164 +4,1176 @@
  <context>
   <name>Strandline</name>
   <message>
-   <source>the one that 'Check engine' installs</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>none: this computer</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Strandline computes in a Python of its own. Run 'Check engine' from the toolbox to install or test it.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Python of the engine</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Dask scheduler</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
    <source>1 Survey</source>
-   <translation type="unfinished" />
+   <translation>1 Levé</translation>
   </message>
   <message>
    <source>2 Surface</source>
-   <translation type="unfinished" />
+   <translation>2 Surface</translation>
   </message>
   <message>
    <source>3 Change</source>
-   <translation type="unfinished" />
+   <translation>3 Évolution</translation>
   </message>
   <message>
    <source>Tools</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Cancelled.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>There is nothing to write to {}.</source>
-   <translation type="unfinished" />
+   <translation>Outils</translation>
   </message>
   <message>
    <source>{} is not a survey folder: make one with 'Create survey'.</source>
-   <translation type="unfinished" />
+   <translation>{} n'est pas un dossier de levé : créez-en un avec « Créer un levé ».</translation>
+  </message>
+  <message>
+   <source>Cancelled.</source>
+   <translation>Annulé.</translation>
+  </message>
+  <message>
+   <source>There is nothing to write to {}.</source>
+   <translation>Il n'y a rien à écrire dans {}.</translation>
   </message>
   <message>
    <source>Check engine</source>
-   <translation type="unfinished" />
+   <translation>Vérifier le moteur</translation>
   </message>
   <message>
    <source>Tells whether the engine, the Python environment in which Strandline computes, is complete. With 'Install' it is made first: a virtual environment of about 1 GB in the QGIS profile, from the versions that Strandline was tested with. Nothing else in Strandline downloads anything.</source>
-   <translation type="unfinished" />
+   <translation>Indique si le moteur, l'environnement Python dans lequel Strandline calcule, est complet. Avec « Installer », il est d'abord créé : un environnement virtuel d'environ 1 Go dans le profil QGIS, avec les versions pour lesquelles Strandline a été testé. Rien d'autre dans Strandline ne télécharge quoi que ce soit.</translation>
   </message>
   <message>
    <source>Install</source>
-   <translation type="unfinished" />
+   <translation>Installer</translation>
   </message>
   <message>
    <source>Install or complete the engine before checking it.</source>
-   <translation type="unfinished" />
+   <translation>Installer ou compléter le moteur avant de le vérifier.</translation>
   </message>
   <message>
    <source>Python to use</source>
-   <translation type="unfinished" />
+   <translation>Python à utiliser</translation>
   </message>
   <message>
    <source>A Python of at least 3.11 to make a new environment with. Empty: one is looked for on this computer.</source>
-   <translation type="unfinished" />
+   <translation>Un Python 3.11 ou plus récent avec lequel créer un nouvel environnement. Vide : il est cherché sur cet ordinateur.</translation>
   </message>
   <message>
    <source>Folder of wheels</source>
-   <translation type="unfinished" />
+   <translation>Dossier de paquets wheel</translation>
   </message>
   <message>
    <source>Install from the Python packages in this folder instead of the network, for computers without one.</source>
-   <translation type="unfinished" />
+   <translation>Installer à partir des paquets Python de ce dossier plutôt que du réseau, pour les ordinateurs qui n'en ont pas.</translation>
   </message>
   <message>
    <source>The engine is ready</source>
-   <translation type="unfinished" />
+   <translation>Le moteur est prêt</translation>
   </message>
   <message>
    <source>The engine is ready: Python {}, {}.</source>
-   <translation type="unfinished" />
+   <translation>Le moteur est prêt : Python {}, {}.</translation>
   </message>
   <message>
    <source>Installing the engine in {} with {}.</source>
-   <translation type="unfinished" />
+   <translation>Installation du moteur dans {} avec {}.</translation>
   </message>
   <message>
    <source>The engine could not be installed: {} (see the lines above).</source>
-   <translation type="unfinished" />
+   <translation>Le moteur n'a pas pu être installé : {} (voir les lignes ci-dessus).</translation>
   </message>
   <message>
    <source>Create survey</source>
-   <translation type="unfinished" />
+   <translation>Créer un levé</translation>
   </message>
   <message>
    <source>Makes a survey folder for the photographs of one flight: reads size, camera, time and GNSS position from each file, and chooses the CRS. The photographs stay where they are and are never changed. Every later step takes this folder and adds its own files to it.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>The survey is made in QGIS's temporary folder and will be gone when QGIS closes: {}.</source>
-   <translation type="unfinished" />
+   <translation>Crée un dossier de levé pour les photographies d'un vol : lit la taille, l'appareil, l'heure et la position GNSS de chaque fichier, et choisit le SCR. Les photographies restent où elles sont et ne sont jamais modifiées. Chaque étape suivante prend ce dossier et y ajoute ses propres fichiers.</translation>
   </message>
   <message>
    <source>Folder of photographs</source>
-   <translation type="unfinished" />
+   <translation>Dossier des photographies</translation>
   </message>
   <message>
    <source>Photographs of one flight (JPG, TIFF); sub-folders count.</source>
-   <translation type="unfinished" />
+   <translation>Photographies d'un seul vol (JPG, TIFF) ; les sous-dossiers comptent.</translation>
   </message>
   <message>
    <source>Only files named</source>
-   <translation type="unfinished" />
+   <translation>Seulement les fichiers nommés</translation>
   </message>
   <message>
    <source>A pattern such as *.JPG. Needed when a JPG and a RAW of the same name lie side by side: it picks one kind.</source>
-   <translation type="unfinished" />
+   <translation>Un motif tel que *.JPG. Nécessaire quand un JPG et un RAW de même nom se côtoient : il en choisit un.</translation>
   </message>
   <message>
    <source>Positions of the photographs</source>
-   <translation type="unfinished" />
+   <translation>Positions des photographies</translation>
   </message>
   <message>
    <source>A table (a CSV will do) with the fields image, x, y, z and, if known, sigma_h and sigma_v in metres. It replaces the positions in the photographs, for example after PPK processing.</source>
-   <translation type="unfinished" />
+   <translation>Une table (un CSV convient) avec les champs image, x, y, z et, s'ils sont connus, sigma_h et sigma_v en mètres. Elle remplace les positions contenues dans les photographies, par exemple après un traitement PPK.</translation>
   </message>
   <message>
    <source>CRS of these positions</source>
-   <translation type="unfinished" />
+   <translation>SCR de ces positions</translation>
   </message>
   <message>
    <source>CRS of x and y in the table; WGS 84 (longitude, latitude) when left empty.</source>
-   <translation type="unfinished" />
+   <translation>SCR de x et y dans la table ; WGS 84 (longitude, latitude) si vide.</translation>
   </message>
   <message>
    <source>CRS of the survey</source>
-   <translation type="unfinished" />
+   <translation>SCR du levé</translation>
   </message>
   <message>
    <source>Projected CRS of everything made from this survey. Empty: the UTM zone of the positions, if there are any.</source>
-   <translation type="unfinished" />
+   <translation>SCR projeté de tout ce qui est tiré de ce levé. Vide : la zone UTM des positions, s'il y en a.</translation>
   </message>
   <message>
    <source>Survey folder</source>
-   <translation type="unfinished" />
+   <translation>Dossier du levé</translation>
   </message>
   <message>
    <source>Folder to make. Choose a permanent place: it is the survey.</source>
-   <translation type="unfinished" />
+   <translation>Dossier à créer. Choisissez un endroit permanent : c'est le levé.</translation>
   </message>
   <message>
    <source>Photograph positions</source>
-   <translation type="unfinished" />
+   <translation>Positions des photographies</translation>
   </message>
   <message>
    <source>A point for every photograph with a position.</source>
-   <translation type="unfinished" />
+   <translation>Un point pour chaque photographie qui a une position.</translation>
   </message>
   <message>
    <source>Photographs</source>
-   <translation type="unfinished" />
+   <translation>Photographies</translation>
   </message>
   <message>
    <source>Photographs with a position</source>
-   <translation type="unfinished" />
+   <translation>Photographies avec une position</translation>
   </message>
   <message>
-   <source>Standard deviation of each height in metres, from 'Export DSM'.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Standard deviation of the heights in metres, one number, where there is no precision raster.</source>
-   <translation type="unfinished" />
+   <source>The survey is made in QGIS's temporary folder and will be gone when QGIS closes: {}.</source>
+   <translation>Le levé est créé dans le dossier temporaire de QGIS et disparaîtra à sa fermeture : {}.</translation>
   </message>
   <message>
    <source>DSM difference</source>
-   <translation type="unfinished" />
+   <translation>Différence de MNS</translation>
   </message>
   <message>
    <source>Subtracts two surfaces (after minus before) and sums erosion, deposition and the net volume per zone, each with its standard deviation. That deviation counts noise, errors that neighbours share, and errors common to the whole surface separately. What no surface covers is not extrapolated: the share covered is told.</source>
-   <translation type="unfinished" />
+   <translation>Soustrait deux surfaces (après moins avant) et somme l'érosion, le dépôt et le volume net par zone, chacun avec son écart-type. Celui-ci compte séparément le bruit, les erreurs que des voisins partagent et celles communes à toute la surface. Ce qu'aucune surface ne couvre n'est pas extrapolé : la part couverte est indiquée.</translation>
   </message>
   <message>
    <source>DSM before</source>
-   <translation type="unfinished" />
+   <translation>MNS avant</translation>
   </message>
   <message>
    <source>The earlier surface.</source>
-   <translation type="unfinished" />
+   <translation>La surface la plus ancienne.</translation>
   </message>
   <message>
    <source>DSM after</source>
-   <translation type="unfinished" />
+   <translation>MNS après</translation>
   </message>
   <message>
    <source>The later surface; another grid or CRS is resampled to the coarser one.</source>
-   <translation type="unfinished" />
+   <translation>La surface la plus récente ; une autre grille ou un autre SCR est rééchantillonné sur la plus grossière.</translation>
   </message>
   <message>
    <source>Nodata value</source>
-   <translation type="unfinished" />
+   <translation>Valeur nodata</translation>
   </message>
   <message>
    <source>The value of empty cells in both surfaces, where their files do not say it.</source>
-   <translation type="unfinished" />
+   <translation>La valeur des cellules vides des deux surfaces, quand leurs fichiers ne la disent pas.</translation>
   </message>
   <message>
    <source>Stable ground</source>
-   <translation type="unfinished" />
+   <translation>Terrain stable</translation>
   </message>
   <message>
    <source>Polygons where nothing changed, such as rock or road: they tell the error of the difference.</source>
-   <translation type="unfinished" />
+   <translation>Polygones où rien n'a changé, comme du rocher ou une route : ils révèlent l'erreur de la différence.</translation>
   </message>
   <message>
    <source>Zones</source>
-   <translation type="unfinished" />
+   <translation>Zones</translation>
   </message>
   <message>
    <source>Polygons to sum volumes in; empty: the overlap of both surfaces.</source>
-   <translation type="unfinished" />
+   <translation>Polygones dans lesquels sommer les volumes ; vide : le recouvrement des deux surfaces.</translation>
   </message>
   <message>
    <source>Field of zone names</source>
-   <translation type="unfinished" />
+   <translation>Champ des noms de zones</translation>
   </message>
   <message>
    <source>Empty: the field 'name' if there is one, else the feature id.</source>
-   <translation type="unfinished" />
+   <translation>Vide : le champ « name » s'il existe, sinon l'identifiant de l'entité.</translation>
   </message>
   <message>
    <source>Areas to ignore</source>
-   <translation type="unfinished" />
+   <translation>Zones à ignorer</translation>
   </message>
   <message>
    <source>Polygons left out of everything, such as water or people.</source>
-   <translation type="unfinished" />
+   <translation>Polygones exclus de tout, comme l'eau ou les personnes.</translation>
   </message>
   <message>
    <source>Co-registration</source>
-   <translation type="unfinished" />
+   <translation>Recalage</translation>
   </message>
   <message>
    <source>How the later surface is brought onto the earlier one on stable ground: not at all (none), by its median height (vertical), by a tilted plane (plane), or also in plan (horizontal); auto chooses what that ground supports.</source>
-   <translation type="unfinished" />
+   <translation>Comment la surface récente est ramenée sur l'ancienne en terrain stable : pas du tout (none), par sa hauteur médiane (vertical), par un plan incliné (plane) ou aussi en planimétrie (horizontal) ; auto choisit ce que ce terrain permet.</translation>
   </message>
   <message>
    <source>Level of detection</source>
-   <translation type="unfinished" />
+   <translation>Seuil de détection</translation>
   </message>
   <message>
    <source>What counts as significant: each cell against its own deviation (cell), one threshold for all (uniform), or cells that agree with their neighbours (coherent).</source>
-   <translation type="unfinished" />
+   <translation>Ce qui est tenu pour significatif : chaque cellule selon son propre écart-type (cell), un seuil pour toutes (uniform), ou les cellules qui s'accordent avec leurs voisines (coherent).</translation>
   </message>
   <message>
    <source>Confidence</source>
-   <translation type="unfinished" />
+   <translation>Confiance</translation>
   </message>
   <message>
    <source>Of significance and of the interval of the net volume, between 0 and 1.</source>
-   <translation type="unfinished" />
+   <translation>De la signification et de l'intervalle du volume net, entre 0 et 1.</translation>
   </message>
   <message>
    <source>Difference</source>
-   <translation type="unfinished" />
+   <translation>Différence</translation>
   </message>
   <message>
    <source>After minus before in metres.</source>
-   <translation type="unfinished" />
+   <translation>Après moins avant, en mètres.</translation>
   </message>
   <message>
    <source>Significant difference</source>
-   <translation type="unfinished" />
+   <translation>Différence significative</translation>
   </message>
   <message>
    <source>The difference where it is significant.</source>
-   <translation type="unfinished" />
+   <translation>La différence là où elle est significative.</translation>
   </message>
   <message>
    <source>Volumes</source>
-   <translation type="unfinished" />
+   <translation>Volumes</translation>
   </message>
   <message>
    <source>The zones with their volumes in m3 and their deviations.</source>
-   <translation type="unfinished" />
+   <translation>Les zones avec leurs volumes en m3 et leurs écarts-types.</translation>
+  </message>
+  <message>
+   <source>Standard deviation of each height in metres, from 'Export DSM'.</source>
+   <translation>Écart-type de chaque hauteur en mètres, tiré de « Exporter le MNS ».</translation>
   </message>
   <message>
    <source>Precision before</source>
-   <translation type="unfinished" />
+   <translation>Précision avant</translation>
   </message>
   <message>
    <source>Precision after</source>
-   <translation type="unfinished" />
+   <translation>Précision après</translation>
+  </message>
+  <message>
+   <source>Standard deviation of the heights in metres, one number, where there is no precision raster.</source>
+   <translation>Écart-type des hauteurs en mètres, un seul nombre, quand il n'y a pas de raster de précision.</translation>
   </message>
   <message>
    <source>Deviation before (m)</source>
-   <translation type="unfinished" />
+   <translation>Écart-type avant (m)</translation>
   </message>
   <message>
    <source>Deviation after (m)</source>
-   <translation type="unfinished" />
+   <translation>Écart-type après (m)</translation>
   </message>
   <message>
    <source>Deviation of the registration (m)</source>
-   <translation type="unfinished" />
+   <translation>Écart-type du recalage (m)</translation>
   </message>
   <message>
    <source>Of one surface against the other as a whole; used where the stable ground cannot tell.</source>
-   <translation type="unfinished" />
+   <translation>D'une surface entière par rapport à l'autre ; utilisé quand le terrain stable ne peut le dire.</translation>
   </message>
   <message>
    <source>Range of shared errors (m)</source>
-   <translation type="unfinished" />
+   <translation>Portée des erreurs partagées (m)</translation>
   </message>
   <message>
    <source>Up to which distance neighbouring cells err alike; used where the stable ground cannot tell.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Net volume (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Deviation of the net volume (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Its part from noise (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Its part from errors that neighbours share (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Its part from errors common to the surface (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Erosion (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Deviation of the erosion (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Deposition (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Deviation of the deposition (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Significant erosion (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Significant deposition (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Significant net volume (m3)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Area (m2)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Area covered by both surfaces (%)</source>
-   <translation type="unfinished" />
+   <translation>Jusqu'à quelle distance des cellules voisines se trompent ensemble ; utilisé quand le terrain stable ne peut le dire.</translation>
   </message>
   <message>
    <source>{0}_PRECISION and {0}_SIGMA exclude each other: give one of them.</source>
-   <translation type="unfinished" />
+   <translation>{0}_PRECISION et {0}_SIGMA s'excluent : donnez l'un des deux.</translation>
+  </message>
+  <message>
+   <source>Net volume (m3)</source>
+   <translation>Volume net (m3)</translation>
+  </message>
+  <message>
+   <source>Deviation of the net volume (m3)</source>
+   <translation>Écart-type du volume net (m3)</translation>
+  </message>
+  <message>
+   <source>Its part from noise (m3)</source>
+   <translation>Sa part due au bruit (m3)</translation>
+  </message>
+  <message>
+   <source>Its part from errors that neighbours share (m3)</source>
+   <translation>Sa part due aux erreurs que des voisins partagent (m3)</translation>
+  </message>
+  <message>
+   <source>Its part from errors common to the surface (m3)</source>
+   <translation>Sa part due aux erreurs communes à la surface (m3)</translation>
+  </message>
+  <message>
+   <source>Erosion (m3)</source>
+   <translation>Érosion (m3)</translation>
+  </message>
+  <message>
+   <source>Deviation of the erosion (m3)</source>
+   <translation>Écart-type de l'érosion (m3)</translation>
+  </message>
+  <message>
+   <source>Deposition (m3)</source>
+   <translation>Dépôt (m3)</translation>
+  </message>
+  <message>
+   <source>Deviation of the deposition (m3)</source>
+   <translation>Écart-type du dépôt (m3)</translation>
+  </message>
+  <message>
+   <source>Significant erosion (m3)</source>
+   <translation>Érosion significative (m3)</translation>
+  </message>
+  <message>
+   <source>Significant deposition (m3)</source>
+   <translation>Dépôt significatif (m3)</translation>
+  </message>
+  <message>
+   <source>Significant net volume (m3)</source>
+   <translation>Volume net significatif (m3)</translation>
+  </message>
+  <message>
+   <source>Area (m2)</source>
+   <translation>Aire (m2)</translation>
+  </message>
+  <message>
+   <source>Area covered by both surfaces (%)</source>
+   <translation>Aire couverte par les deux surfaces (%)</translation>
   </message>
   <message>
    <source>Enhance photographs</source>
-   <translation type="unfinished" />
+   <translation>Rehausser les photographies</translation>
   </message>
   <message>
    <source>Raises the local contrast of bare sand so that tie points can be found on it. The enhanced images serve tie points only: the surface and the orthophoto are always made from the original photographs.</source>
-   <translation type="unfinished" />
+   <translation>Augmente le contraste local du sable nu pour que des points de liaison s'y trouvent. Les images rehaussées ne servent qu'aux points de liaison : la surface et l'orthophoto viennent toujours des photographies d'origine.</translation>
   </message>
   <message>
    <source>Method</source>
-   <translation type="unfinished" />
+   <translation>Méthode</translation>
   </message>
   <message>
    <source>arctan: each pixel against the mean and deviation of its window, through an arc tangent (the best on sand); micmac: MicMac's variant; equalize: the image's whole histogram; none: only reduced to 8 bits.</source>
-   <translation type="unfinished" />
+   <translation>arctan : chaque pixel selon la moyenne et l'écart-type de sa fenêtre, à travers un arc tangente (le meilleur sur le sable) ; micmac : la variante de MicMac ; equalize : l'histogramme de toute l'image ; none : seulement ramenée à 8 bits.</translation>
   </message>
   <message>
    <source>Window</source>
-   <translation type="unfinished" />
+   <translation>Fenêtre</translation>
   </message>
   <message>
    <source>Side of the square window in pixels, an odd number. Larger windows keep more of the broad shapes.</source>
-   <translation type="unfinished" />
+   <translation>Côté de la fenêtre carrée en pixels, un nombre impair. Les grandes fenêtres conservent mieux les formes étendues.</translation>
   </message>
   <message>
    <source>Polygons of water, people or vehicles; no tie points are sought there. It needs to know where the photographs look: a georeferenced survey, or positions with yaw and height in the photographs.</source>
-   <translation type="unfinished" />
+   <translation>Polygones d'eau, de personnes ou de véhicules ; aucun point de liaison n'y est cherché. Il faut savoir où regardent les photographies : un levé géoréférencé, ou des positions avec lacet et hauteur dans les photographies.</translation>
   </message>
   <message>
    <source>Export DSM</source>
-   <translation type="unfinished" />
+   <translation>Exporter le MNS</translation>
   </message>
   <message>
    <source>Computes the surface of a georeferenced survey by correlating the original photographs, cell by cell, with the precision of each height. Cells that cannot be measured stay empty.</source>
-   <translation type="unfinished" />
+   <translation>Calcule la surface d'un levé géoréférencé en corrélant les photographies d'origine, cellule par cellule, avec la précision de chaque hauteur. Les cellules qui ne peuvent être mesurées restent vides.</translation>
   </message>
   <message>
    <source>Cell size (m)</source>
-   <translation type="unfinished" />
+   <translation>Taille des cellules (m)</translation>
   </message>
   <message>
    <source>Side of a cell on the ground; 0 is twice the photographs' pixel.</source>
-   <translation type="unfinished" />
+   <translation>Côté d'une cellule au sol ; 0 vaut deux fois le pixel des photographies.</translation>
   </message>
   <message>
    <source>Area</source>
-   <translation type="unfinished" />
+   <translation>Emprise</translation>
   </message>
   <message>
    <source>Only inside these polygons; empty: wherever enough photographs look.</source>
-   <translation type="unfinished" />
+   <translation>Seulement dans ces polygones ; vide : partout où assez de photographies regardent.</translation>
   </message>
   <message>
    <source>Polygons left empty, such as water or vegetation.</source>
-   <translation type="unfinished" />
+   <translation>Polygones laissés vides, comme l'eau ou la végétation.</translation>
   </message>
   <message>
    <source>Correlation window</source>
-   <translation type="unfinished" />
+   <translation>Fenêtre de corrélation</translation>
   </message>
   <message>
    <source>Side of the window in cells, an odd number; 0 adapts it to the contrast: larger on plain sand.</source>
-   <translation type="unfinished" />
+   <translation>Côté de la fenêtre en cellules, un nombre impair ; 0 l'adapte au contraste : plus grande sur le sable uni.</translation>
   </message>
   <message>
    <source>Regularity</source>
-   <translation type="unfinished" />
+   <translation>Régularité</translation>
   </message>
   <message>
    <source>How much the surface resists to jump from cell to cell: higher is smoother, 0 lets every cell speak for itself.</source>
-   <translation type="unfinished" />
+   <translation>Combien la surface résiste aux sauts d'une cellule à l'autre : plus haut est plus lisse, 0 laisse chaque cellule parler pour elle-même.</translation>
   </message>
   <message>
    <source>Fill gaps up to (m2)</source>
-   <translation type="unfinished" />
+   <translation>Combler les trous jusqu'à (m2)</translation>
   </message>
   <message>
    <source>Gaps up to this area are closed by interpolation and marked in 'Filled cells'; 0 leaves them empty.</source>
-   <translation type="unfinished" />
+   <translation>Les trous jusqu'à cette aire sont comblés par interpolation et marqués dans « Cellules comblées » ; 0 les laisse vides.</translation>
   </message>
   <message>
    <source>DSM</source>
-   <translation type="unfinished" />
+   <translation>MNS</translation>
   </message>
   <message>
    <source>Heights in metres, in the survey's CRS.</source>
-   <translation type="unfinished" />
+   <translation>Hauteurs en mètres, dans le SCR du levé.</translation>
   </message>
   <message>
    <source>Precision</source>
-   <translation type="unfinished" />
+   <translation>Précision</translation>
   </message>
   <message>
    <source>Standard deviation of each height in metres, from matching alone; 'DSM difference' uses it.</source>
-   <translation type="unfinished" />
+   <translation>Écart-type de chaque hauteur en mètres, de la seule corrélation ; « Différence de MNS » s'en sert.</translation>
   </message>
   <message>
    <source>Correlation</source>
-   <translation type="unfinished" />
+   <translation>Corrélation</translation>
   </message>
   <message>
    <source>How alike the photographs are at each cell, up to 1.</source>
-   <translation type="unfinished" />
+   <translation>La ressemblance des photographies en chaque cellule, jusqu'à 1.</translation>
   </message>
   <message>
    <source>Views</source>
-   <translation type="unfinished" />
+   <translation>Vues</translation>
   </message>
   <message>
    <source>How many photographs measured each cell.</source>
-   <translation type="unfinished" />
+   <translation>Combien de photographies ont mesuré chaque cellule.</translation>
   </message>
   <message>
    <source>Filled cells</source>
-   <translation type="unfinished" />
+   <translation>Cellules comblées</translation>
   </message>
   <message>
    <source>1 where the height was interpolated.</source>
-   <translation type="unfinished" />
+   <translation>1 là où la hauteur a été interpolée.</translation>
   </message>
   <message>
    <source>Orthophoto</source>
-   <translation type="unfinished" />
+   <translation>Orthophoto</translation>
   </message>
   <message>
    <source>The photographs' colours on the surface.</source>
-   <translation type="unfinished" />
+   <translation>Les couleurs des photographies sur la surface.</translation>
   </message>
   <message>
    <source>Point cloud</source>
-   <translation type="unfinished" />
+   <translation>Nuage de points</translation>
   </message>
   <message>
    <source>The surface as coloured points in a LAZ file.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Ground pixel (m)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Cells with a height (%)</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Median precision (m)</source>
-   <translation type="unfinished" />
+   <translation>La surface en points colorés dans un fichier LAZ.</translation>
   </message>
   <message>
    <source>LAZ files (*.laz)</source>
-   <translation type="unfinished" />
+   <translation>Fichiers LAZ (*.laz)</translation>
+  </message>
+  <message>
+   <source>Ground pixel (m)</source>
+   <translation>Pixel au sol (m)</translation>
+  </message>
+  <message>
+   <source>Cells with a height (%)</source>
+   <translation>Cellules avec une hauteur (%)</translation>
+  </message>
+  <message>
+   <source>Median precision (m)</source>
+   <translation>Précision médiane (m)</translation>
   </message>
   <message>
    <source>Georeference</source>
-   <translation type="unfinished" />
+   <translation>Géoréférencer</translation>
   </message>
   <message>
    <source>Brings an oriented survey to the ground with control points, with the positions of the photographs, or with both, and says how well: on control points, on check points that took no part, and by leaving each control point out in turn.</source>
-   <translation type="unfinished" />
+   <translation>Rattache un levé orienté au terrain par des points d'appui, par les positions des photographies, ou par les deux, et dit avec quelle qualité : sur les points d'appui, sur des points de contrôle qui n'ont pas servi, et en écartant chaque point d'appui à son tour.</translation>
   </message>
   <message>
    <source>similarity: shift, rotation and scale alone, the shape of the block stays; adjustment: a bundle adjustment in which the control points also mend the shape.</source>
-   <translation type="unfinished" />
+   <translation>similarity : translation, rotation et échelle seules, la forme du bloc demeure ; adjustment : une compensation par faisceaux dans laquelle les points d'appui corrigent aussi la forme.</translation>
   </message>
   <message>
    <source>Use the positions of the photographs</source>
-   <translation type="unfinished" />
+   <translation>Utiliser les positions des photographies</translation>
   </message>
   <message>
    <source>The photographs' GNSS positions take part, each with the accuracy it claims.</source>
-   <translation type="unfinished" />
+   <translation>Les positions GNSS des photographies participent, chacune avec la précision qu'elle annonce.</translation>
   </message>
   <message>
    <source>Lever arm</source>
-   <translation type="unfinished" />
+   <translation>Bras de levier</translation>
   </message>
   <message>
-   <source>From the GNSS antenna to the camera in metres, three numbers: right, forward, up, of the levelled aircraft.</source>
-   <translation type="unfinished" />
+   <source>From the camera to the GNSS antenna in metres, three numbers: right, forward, up, of the levelled aircraft.</source>
+   <translation>De l'antenne GNSS à l'appareil en mètres, trois nombres : droite, avant, haut, de l'aéronef à l'horizontale.</translation>
   </message>
   <message>
    <source>Heights of the ground points</source>
-   <translation type="unfinished" />
+   <translation>Hauteurs des points au sol</translation>
   </message>
   <message>
    <source>What the ground points' heights refer to: the ellipsoid, or mean sea level (orthometric).</source>
-   <translation type="unfinished" />
+   <translation>À quoi se rapportent les hauteurs des points au sol : l'ellipsoïde, ou le niveau moyen de la mer (orthometric).</translation>
   </message>
   <message>
    <source>Heights of the photographs</source>
-   <translation type="unfinished" />
+   <translation>Hauteurs des photographies</translation>
   </message>
   <message>
    <source>What the heights of the photographs' positions refer to: the ellipsoid, or mean sea level (orthometric).</source>
-   <translation type="unfinished" />
+   <translation>À quoi se rapportent les hauteurs des positions des photographies : l'ellipsoïde, ou le niveau moyen de la mer (orthometric).</translation>
   </message>
   <message>
    <source>Geoid</source>
-   <translation type="unfinished" />
+   <translation>Géoïde</translation>
   </message>
   <message>
    <source>A raster of geoid heights, or one number in metres. Needed when the two kinds of heights differ.</source>
-   <translation type="unfinished" />
+   <translation>Un raster des hauteurs du géoïde, ou un nombre en mètres. Nécessaire quand les deux sortes de hauteurs diffèrent.</translation>
   </message>
   <message>
    <source>Polygons of water, people or vehicles; tie points in them take no part.</source>
-   <translation type="unfinished" />
+   <translation>Polygones d'eau, de personnes ou de véhicules ; les points de liaison qui s'y trouvent ne participent pas.</translation>
   </message>
   <message>
    <source>Projected CRS of the results; empty: the survey's own.</source>
-   <translation type="unfinished" />
+   <translation>SCR projeté des résultats ; vide : celui du levé.</translation>
   </message>
   <message>
    <source>Residuals</source>
-   <translation type="unfinished" />
+   <translation>Résidus</translation>
   </message>
   <message>
    <source>The ground points with their residuals in metres, drawn as arrows.</source>
-   <translation type="unfinished" />
+   <translation>Les points au sol avec leurs résidus en mètres, dessinés en flèches.</translation>
   </message>
   <message>
    <source>Camera positions</source>
-   <translation type="unfinished" />
+   <translation>Positions de l'appareil</translation>
   </message>
   <message>
    <source>Where each photograph was taken from, as computed.</source>
-   <translation type="unfinished" />
+   <translation>D'où chaque photographie a été prise, selon le calcul.</translation>
   </message>
   <message>
    <source>Ground points</source>
-   <translation type="unfinished" />
+   <translation>Points au sol</translation>
   </message>
   <message>
    <source>Points surveyed on the ground: control points and check points.</source>
-   <translation type="unfinished" />
+   <translation>Points levés au sol : points d'appui et points de contrôle.</translation>
   </message>
   <message>
    <source>Field of names</source>
-   <translation type="unfinished" />
+   <translation>Champ des noms</translation>
   </message>
   <message>
    <source>The field that names each ground point.</source>
-   <translation type="unfinished" />
+   <translation>Le champ qui nomme chaque point au sol.</translation>
   </message>
   <message>
    <source>Field of heights</source>
-   <translation type="unfinished" />
+   <translation>Champ des hauteurs</translation>
   </message>
   <message>
    <source>The field with the height; empty: the Z of the points.</source>
-   <translation type="unfinished" />
+   <translation>Le champ qui donne la hauteur ; vide : le Z des points.</translation>
   </message>
   <message>
    <source>Field of roles</source>
-   <translation type="unfinished" />
+   <translation>Champ des rôles</translation>
   </message>
   <message>
    <source>The field that says 'control' or 'check'. Check points take no part and tell the accuracy.</source>
-   <translation type="unfinished" />
+   <translation>Le champ qui dit « control » (appui) ou « check » (contrôle). Les points de contrôle ne participent pas et révèlent l'exactitude.</translation>
   </message>
   <message>
    <source>Accuracy in plan (m)</source>
-   <translation type="unfinished" />
+   <translation>Précision en planimétrie (m)</translation>
   </message>
   <message>
    <source>Standard deviation of the ground points in plan.</source>
-   <translation type="unfinished" />
+   <translation>Écart-type des points au sol en planimétrie.</translation>
   </message>
   <message>
    <source>Accuracy in height (m)</source>
-   <translation type="unfinished" />
+   <translation>Précision en altimétrie (m)</translation>
   </message>
   <message>
    <source>Standard deviation of the ground points in height.</source>
-   <translation type="unfinished" />
+   <translation>Écart-type des points au sol en altimétrie.</translation>
   </message>
   <message>
    <source>Field of accuracy in plan</source>
-   <translation type="unfinished" />
+   <translation>Champ de précision en planimétrie</translation>
   </message>
   <message>
    <source>Where the accuracy differs from point to point.</source>
-   <translation type="unfinished" />
+   <translation>Quand la précision diffère d'un point à l'autre.</translation>
   </message>
   <message>
    <source>Field of accuracy in height</source>
-   <translation type="unfinished" />
+   <translation>Champ de précision en altimétrie</translation>
   </message>
   <message>
    <source>Marks in the photographs</source>
-   <translation type="unfinished" />
+   <translation>Pointés dans les photographies</translation>
   </message>
   <message>
    <source>A table (a CSV will do) with the fields gcp, image, x, y: where each ground point is seen, in pixels.</source>
-   <translation type="unfinished" />
+   <translation>Une table (un CSV convient) avec les champs gcp, image, x, y : où chaque point au sol est vu, en pixels.</translation>
   </message>
   <message>
    <source>File of ground points and marks</source>
-   <translation type="unfinished" />
+   <translation>Fichier de points et de pointés</translation>
   </message>
   <message>
-   <source>Instead of both: a gcp_list.txt of OpenDroneMap, or a file of Metashape or MicMac.</source>
-   <translation type="unfinished" />
+   <source>Instead of both: a gcp_list.txt of OpenDroneMap, or markers of Metashape as XML.</source>
+   <translation>Au lieu des deux : un gcp_list.txt d'OpenDroneMap, ou un fichier de Metashape ou de MicMac.</translation>
   </message>
   <message>
    <source>Check points</source>
-   <translation type="unfinished" />
+   <translation>Points de contrôle</translation>
   </message>
   <message>
    <source>Names of ground points that shall only check, separated by commas.</source>
-   <translation type="unfinished" />
+   <translation>Noms des points au sol qui ne doivent que contrôler, séparés par des virgules.</translation>
   </message>
   <message>
    <source>Accuracy of the marks (px)</source>
-   <translation type="unfinished" />
+   <translation>Précision des pointés (px)</translation>
   </message>
   <message>
    <source>Standard deviation of a mark.</source>
-   <translation type="unfinished" />
+   <translation>Écart-type d'un pointé.</translation>
   </message>
   <message>
    <source>GCPS and GCP_FILE exclude each other: give one of them.</source>
-   <translation type="unfinished" />
+   <translation>GCPS et GCP_FILE s'excluent : donnez l'un des deux.</translation>
   </message>
   <message>
    <source>GCPS need NAME_FIELD: name the field with the points' names.</source>
-   <translation type="unfinished" />
+   <translation>GCPS demande NAME_FIELD : indiquez le champ des noms des points.</translation>
   </message>
   <message>
    <source>GCPS need MARKS: give the table of their places in the photographs.</source>
-   <translation type="unfinished" />
+   <translation>GCPS demande MARKS : donnez la table de leurs places dans les photographies.</translation>
   </message>
   <message>
    <source>Nothing to georeference with: give GCPS with MARKS, GCP_FILE, or USE_GNSS.</source>
-   <translation type="unfinished" />
+   <translation>Rien pour géoréférencer : donnez GCPS avec MARKS, GCP_FILE, ou USE_GNSS.</translation>
   </message>
   <message>
    <source>Control points</source>
-   <translation type="unfinished" />
+   <translation>Points d'appui</translation>
   </message>
   <message>
    <source>Error on control points, plan (m)</source>
-   <translation type="unfinished" />
+   <translation>Erreur sur les points d'appui, planimétrie (m)</translation>
   </message>
   <message>
    <source>Error on control points, height (m)</source>
-   <translation type="unfinished" />
+   <translation>Erreur sur les points d'appui, altimétrie (m)</translation>
   </message>
   <message>
    <source>Error on check points, plan (m)</source>
-   <translation type="unfinished" />
+   <translation>Erreur sur les points de contrôle, planimétrie (m)</translation>
   </message>
   <message>
    <source>Error on check points, height (m)</source>
-   <translation type="unfinished" />
+   <translation>Erreur sur les points de contrôle, altimétrie (m)</translation>
   </message>
   <message>
    <source>Error on points left out, plan (m)</source>
-   <translation type="unfinished" />
+   <translation>Erreur sur les points écartés, planimétrie (m)</translation>
   </message>
   <message>
    <source>Error on points left out, height (m)</source>
-   <translation type="unfinished" />
+   <translation>Erreur sur les points écartés, altimétrie (m)</translation>
   </message>
   <message>
    <source>Residual of the photographs' positions, plan (m)</source>
-   <translation type="unfinished" />
+   <translation>Résidu des positions des photographies, planimétrie (m)</translation>
   </message>
   <message>
    <source>Residual of the photographs' positions, height (m)</source>
-   <translation type="unfinished" />
+   <translation>Résidu des positions des photographies, altimétrie (m)</translation>
   </message>
   <message>
    <source>Doming (m)</source>
-   <translation type="unfinished" />
+   <translation>Effet de dôme (m)</translation>
   </message>
   <message>
    <source>Orient photographs</source>
-   <translation type="unfinished" />
+   <translation>Orienter les photographies</translation>
   </message>
   <message>
    <source>Finds from the tie points where each photograph was taken and how the camera draws, in a free frame without scale. 'Georeference' brings the result to the ground.</source>
-   <translation type="unfinished" />
+   <translation>Trouve à partir des points de liaison d'où chaque photographie a été prise et comment l'appareil dessine, dans un repère libre sans échelle. « Géoréférencer » rattache le résultat au terrain.</translation>
   </message>
   <message>
    <source>Camera model</source>
-   <translation type="unfinished" />
+   <translation>Modèle d'appareil</translation>
   </message>
   <message>
    <source>brown: focal length, principal point, two radial and two tangential terms; radial: focal length, principal point, two radial terms; simple_radial: one radial term; full: with rational radial terms, for wide lenses and many photographs.</source>
-   <translation type="unfinished" />
+   <translation>brown : focale, point principal, deux termes radiaux et deux tangentiels ; radial : focale, point principal, deux termes radiaux ; simple_radial : un terme radial ; full : avec des termes radiaux rationnels, pour les grands-angles et de nombreuses photographies.</translation>
   </message>
   <message>
    <source>Calibration from the survey</source>
-   <translation type="unfinished" />
+   <translation>Calibration reprise du levé</translation>
   </message>
   <message>
    <source>Another survey, already oriented, flown with the same camera and focus: its calibration is used.</source>
-   <translation type="unfinished" />
+   <translation>Un autre levé, déjà orienté, volé avec le même appareil et la même mise au point : sa calibration est reprise.</translation>
   </message>
   <message>
    <source>Use of that calibration</source>
-   <translation type="unfinished" />
+   <translation>Usage de cette calibration</translation>
   </message>
   <message>
    <source>prior: a start that may be refined; fixed: kept as it is.</source>
-   <translation type="unfinished" />
+   <translation>prior : un départ qui peut être affiné ; fixed : gardée telle quelle.</translation>
   </message>
   <message>
    <source>Mapper</source>
-   <translation type="unfinished" />
+   <translation>Reconstruction</translation>
   </message>
   <message>
    <source>incremental: photograph by photograph; global: all at once, quicker on large blocks; auto chooses.</source>
-   <translation type="unfinished" />
+   <translation>incremental : photographie par photographie ; global : toutes à la fois, plus rapide sur de grands blocs ; auto choisit.</translation>
   </message>
   <message>
    <source>Tie points (point cloud)</source>
-   <translation type="unfinished" />
+   <translation>Points de liaison (nuage de points)</translation>
   </message>
   <message>
    <source>The oriented tie points as a LAZ file, in the free frame.</source>
-   <translation type="unfinished" />
+   <translation>Les points de liaison orientés dans un fichier LAZ, dans le repère libre.</translation>
   </message>
   <message>
    <source>Oriented photographs</source>
-   <translation type="unfinished" />
+   <translation>Photographies orientées</translation>
   </message>
   <message>
    <source>Mean tie points per photograph</source>
-   <translation type="unfinished" />
+   <translation>Points de liaison par photographie, en moyenne</translation>
   </message>
   <message>
    <source>Tie points kept (%)</source>
-   <translation type="unfinished" />
+   <translation>Points de liaison conservés (%)</translation>
   </message>
   <message>
    <source>Mean multiple tie points per photograph</source>
-   <translation type="unfinished" />
+   <translation>Points de liaison multiples par photographie, en moyenne</translation>
   </message>
   <message>
    <source>Multiple tie points (%)</source>
-   <translation type="unfinished" />
+   <translation>Points de liaison multiples (%)</translation>
   </message>
   <message>
    <source>Mean residual (px)</source>
-   <translation type="unfinished" />
+   <translation>Résidu moyen (px)</translation>
   </message>
   <message>
-   <source>How many processes work side by side; 0 is one per processor. Each takes memory: use fewer if it runs short.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>Address of a Dask scheduler (tcp://host:8786) to spread the work over several computers. The survey must lie where all of them can reach it. Empty: the one in the options, else this computer.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>A page with the step's numbers and pictures, to keep or send. One is always written to the survey's report folder.</source>
-   <translation type="unfinished" />
+   <source>All files (*)</source>
+   <translation>Tous les fichiers (*)</translation>
   </message>
   <message>
    <source>The folder that 'Create survey' made. The step adds its files to it.</source>
-   <translation type="unfinished" />
+   <translation>Le dossier que « Créer un levé » a fait. L'étape y ajoute ses fichiers.</translation>
   </message>
   <message>
-   <source>Report</source>
-   <translation type="unfinished" />
+   <source>How many processes work side by side; 0 is one per processor. Each takes memory: use fewer if it runs short.</source>
+   <translation>Combien de processus travaillent côte à côte ; 0 en prend un par processeur. Chacun prend de la mémoire : réduisez-en le nombre si elle manque.</translation>
   </message>
   <message>
    <source>Processes</source>
-   <translation type="unfinished" />
+   <translation>Processus</translation>
+  </message>
+  <message>
+   <source>Address of a Dask scheduler (tcp://host:8786) to spread the work over several computers. The survey must lie where all of them can reach it. Empty: the one in the options, else this computer.</source>
+   <translation>Adresse d'un ordonnanceur Dask (tcp://hôte:8786) pour répartir le travail sur plusieurs ordinateurs. Le levé doit être là où tous peuvent l'atteindre. Vide : celui des options, sinon cet ordinateur.</translation>
+  </message>
+  <message>
+   <source>Dask scheduler</source>
+   <translation>Ordonnanceur Dask</translation>
+  </message>
+  <message>
+   <source>A page with the step's numbers and pictures, to keep or send.</source>
+   <translation>Une page avec les nombres et les images de l'étape, à garder ou à envoyer.</translation>
+  </message>
+  <message>
+   <source>One is always written to the report folder of the survey.</source>
+   <translation>Une autre est toujours écrite dans le dossier report du levé.</translation>
+  </message>
+  <message>
+   <source>Report</source>
+   <translation>Rapport</translation>
   </message>
   <message>
    <source>HTML files (*.html)</source>
-   <translation type="unfinished" />
+   <translation>Fichiers HTML (*.html)</translation>
   </message>
   <message>
    <source>Simulate survey</source>
-   <translation type="unfinished" />
+   <translation>Simuler un levé</translation>
   </message>
   <message>
    <source>Renders the photographs of a flight over an invented beach, with ground points, marks, zones, and the true surfaces and volumes: to learn the steps, to plan a flight, or to see what accuracy to expect.</source>
-   <translation type="unfinished" />
+   <translation>Calcule les photographies d'un vol au-dessus d'une plage inventée, avec points au sol, pointés, zones, et les surfaces et volumes vrais : pour apprendre les étapes, préparer un vol ou voir quelle exactitude attendre.</translation>
   </message>
   <message>
    <source>Dates</source>
-   <translation type="unfinished" />
+   <translation>Dates</translation>
   </message>
   <message>
    <source>two: the beach before and after a storm, with the true volumes; one: before only.</source>
-   <translation type="unfinished" />
+   <translation>two : la plage avant et après une tempête, avec les volumes vrais ; one : avant seulement.</translation>
   </message>
   <message>
    <source>Length (m)</source>
-   <translation type="unfinished" />
+   <translation>Longueur (m)</translation>
   </message>
   <message>
    <source>Of the beach, along the shore.</source>
-   <translation type="unfinished" />
+   <translation>De la plage, le long du rivage.</translation>
   </message>
   <message>
    <source>Width (m)</source>
-   <translation type="unfinished" />
+   <translation>Largeur (m)</translation>
   </message>
   <message>
    <source>Of the beach, across the shore.</source>
-   <translation type="unfinished" />
+   <translation>De la plage, en travers du rivage.</translation>
   </message>
   <message>
    <source>CRS</source>
-   <translation type="unfinished" />
+   <translation>SCR</translation>
   </message>
   <message>
    <source>A projected CRS in metres; empty: one is chosen.</source>
-   <translation type="unfinished" />
+   <translation>Un SCR projeté en mètres ; vide : il est choisi.</translation>
   </message>
   <message>
    <source>Flying height (m)</source>
-   <translation type="unfinished" />
+   <translation>Hauteur de vol (m)</translation>
   </message>
   <message>
    <source>Above the beach.</source>
-   <translation type="unfinished" />
+   <translation>Au-dessus de la plage.</translation>
   </message>
   <message>
    <source>Forward overlap (%)</source>
-   <translation type="unfinished" />
+   <translation>Recouvrement longitudinal (%)</translation>
   </message>
   <message>
    <source>Of one photograph with the next.</source>
-   <translation type="unfinished" />
+   <translation>D'une photographie avec la suivante.</translation>
   </message>
   <message>
    <source>Side overlap (%)</source>
-   <translation type="unfinished" />
+   <translation>Recouvrement latéral (%)</translation>
   </message>
   <message>
    <source>Of one strip with the next.</source>
-   <translation type="unfinished" />
+   <translation>D'une bande avec la suivante.</translation>
   </message>
   <message>
    <source>Tilt (degrees)</source>
-   <translation type="unfinished" />
+   <translation>Inclinaison (degrés)</translation>
   </message>
   <message>
-   <source>How far the camera leans from the plumb line.</source>
-   <translation type="unfinished" />
+   <source>Standard deviation of the camera's lean from plumb.</source>
+   <translation>Écart-type de l'inclinaison de l'appareil par rapport à la verticale.</translation>
   </message>
   <message>
    <source>Image width (px)</source>
-   <translation type="unfinished" />
+   <translation>Largeur de l'image (px)</translation>
   </message>
   <message>
    <source>Pixels across.</source>
-   <translation type="unfinished" />
+   <translation>Pixels en largeur.</translation>
   </message>
   <message>
    <source>Image height (px)</source>
-   <translation type="unfinished" />
+   <translation>Hauteur de l'image (px)</translation>
   </message>
   <message>
    <source>Pixels down.</source>
-   <translation type="unfinished" />
+   <translation>Pixels en hauteur.</translation>
   </message>
   <message>
    <source>Focal length (px)</source>
-   <translation type="unfinished" />
+   <translation>Focale (px)</translation>
   </message>
   <message>
    <source>Of the camera, in pixels.</source>
-   <translation type="unfinished" />
+   <translation>De l'appareil, en pixels.</translation>
   </message>
   <message>
    <source>Contrast</source>
-   <translation type="unfinished" />
+   <translation>Contraste</translation>
   </message>
   <message>
    <source>Standard deviation of the sand's brightness relative to its mean: 0.04 is dry sand under an even sky.</source>
-   <translation type="unfinished" />
+   <translation>Écart-type de la luminosité du sable rapporté à sa moyenne : 0,04 est du sable sec sous un ciel uniforme.</translation>
   </message>
   <message>
    <source>Noise</source>
-   <translation type="unfinished" />
+   <translation>Bruit</translation>
   </message>
   <message>
    <source>Of the sensor: 1 is a small drone camera at its lowest ISO, 0 is none.</source>
-   <translation type="unfinished" />
+   <translation>Du capteur : 1 est un petit appareil de drone à sa sensibilité la plus basse, 0 est aucun.</translation>
   </message>
   <message>
    <source>GNSS accuracy in plan (m)</source>
-   <translation type="unfinished" />
+   <translation>Précision GNSS en planimétrie (m)</translation>
   </message>
   <message>
    <source>Of the photographs' positions.</source>
-   <translation type="unfinished" />
+   <translation>Des positions des photographies.</translation>
   </message>
   <message>
    <source>GNSS accuracy in height (m)</source>
-   <translation type="unfinished" />
+   <translation>Précision GNSS en altimétrie (m)</translation>
   </message>
   <message>
    <source>Targets laid out as control points.</source>
-   <translation type="unfinished" />
+   <translation>Cibles posées comme points d'appui.</translation>
   </message>
   <message>
    <source>Targets laid out as check points.</source>
-   <translation type="unfinished" />
+   <translation>Cibles posées comme points de contrôle.</translation>
   </message>
   <message>
    <source>Seed</source>
-   <translation type="unfinished" />
+   <translation>Graine</translation>
   </message>
   <message>
    <source>The same number gives the same survey.</source>
-   <translation type="unfinished" />
+   <translation>Le même nombre donne le même levé.</translation>
   </message>
   <message>
    <source>Folder</source>
-   <translation type="unfinished" />
+   <translation>Dossier</translation>
   </message>
   <message>
    <source>Folder to make, with photographs, ground points, marks, zones and truth.</source>
-   <translation type="unfinished" />
+   <translation>Dossier à créer, avec photographies, points au sol, pointés, zones et vérité.</translation>
   </message>
   <message>
    <source>Photographs per date</source>
-   <translation type="unfinished" />
+   <translation>Photographies par date</translation>
+  </message>
+  <message>
+   <source>Deviation of heights to expect (m)</source>
+   <translation>Écart-type des hauteurs à attendre (m)</translation>
   </message>
   <message>
    <source>True erosion (m3)</source>
-   <translation type="unfinished" />
+   <translation>Érosion vraie (m3)</translation>
   </message>
   <message>
    <source>True deposition (m3)</source>
-   <translation type="unfinished" />
+   <translation>Dépôt vrai (m3)</translation>
   </message>
   <message>
    <source>True net volume (m3)</source>
-   <translation type="unfinished" />
+   <translation>Volume net vrai (m3)</translation>
   </message>
   <message>
    <source>Find tie points</source>
-   <translation type="unfinished" />
+   <translation>Chercher les points de liaison</translation>
   </message>
   <message>
    <source>Finds features in the photographs and matches them between overlapping ones. The matches that agree with one geometry are kept in features.db, a COLMAP database.</source>
-   <translation type="unfinished" />
+   <translation>Trouve des détails dans les photographies et les apparie entre celles qui se recouvrent. Les appariements qui s'accordent avec une même géométrie sont gardés dans features.db, une base COLMAP.</translation>
   </message>
   <message>
    <source>Images</source>
-   <translation type="unfinished" />
+   <translation>Images</translation>
   </message>
   <message>
    <source>auto: the enhanced images if they exist, else the originals with a warning; enhanced; original.</source>
-   <translation type="unfinished" />
+   <translation>auto : les images rehaussées si elles existent, sinon les originales avec un avertissement ; enhanced : rehaussées ; original : originales.</translation>
   </message>
   <message>
    <source>Most features per photograph</source>
-   <translation type="unfinished" />
+   <translation>Détails par photographie, au plus</translation>
   </message>
   <message>
    <source>The strongest features are kept, this many of each photograph; 0 is no limit.</source>
-   <translation type="unfinished" />
+   <translation>Les détails les plus forts sont gardés, autant pour chaque photographie ; 0 est sans limite.</translation>
   </message>
   <message>
    <source>Longest side</source>
-   <translation type="unfinished" />
+   <translation>Plus grand côté</translation>
   </message>
   <message>
    <source>Photographs are reduced to this many pixels on their longer side before features are sought; 0 is full size.</source>
-   <translation type="unfinished" />
+   <translation>Les photographies sont réduites à autant de pixels sur leur plus grand côté avant la recherche ; 0 garde leur pleine taille.</translation>
   </message>
   <message>
    <source>Pairs</source>
-   <translation type="unfinished" />
+   <translation>Paires</translation>
   </message>
   <message>
    <source>auto: neighbours by position, or by order and likeness when there are no positions; exhaustive: every pair; sequential: neighbours in the order of the flight.</source>
-   <translation type="unfinished" />
+   <translation>auto : voisines selon les positions, ou selon l'ordre et la ressemblance quand il n'y a pas de positions ; exhaustive : toutes les paires ; sequential : voisines dans l'ordre du vol.</translation>
   </message>
   <message>
    <source>Mean features per photograph</source>
-   <translation type="unfinished" />
+   <translation>Détails par photographie, en moyenne</translation>
   </message>
   <message>
    <source>Verified pairs</source>
-   <translation type="unfinished" />
+   <translation>Paires vérifiées</translation>
   </message>
   <message>
    <source>Verified matches</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>This is a fault of Strandline in '{}': {}; please report it with the lines above (also in {}).</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>The engine was killed ({}) during '{}', most often for want of memory: use fewer WORKERS; its log is {}.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>The engine crashed ({}) during '{}': its last lines stand above, its whole log is {}.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>exit status {}</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>signal {}</source>
-   <translation type="unfinished" />
+   <translation>Appariements vérifiés</translation>
   </message>
   <message>
    <source>The engine's Python {} cannot be started: {}.</source>
-   <translation type="unfinished" />
+   <translation>Le Python du moteur {} ne peut être lancé : {}.</translation>
   </message>
   <message>
-   <source>run strandline:checkengine ('Check engine') with INSTALL=true</source>
-   <translation type="unfinished" />
+   <source>This is a fault of Strandline in '{}': {}; please report it with the lines above (also in {}).</source>
+   <translation>C'est une faute de Strandline dans « {} » : {} ; merci de la signaler avec les lignes ci-dessus (aussi dans {}).</translation>
   </message>
   <message>
-   <source>The engine in {} was made for another version of Strandline: {}.</source>
-   <translation type="unfinished" />
+   <source>The engine was killed ({}) during '{}', most often for want of memory: use fewer WORKERS; its log is {}.</source>
+   <translation>Le moteur a été arrêté ({}) pendant « {} », le plus souvent faute de mémoire : réduisez WORKERS ; son journal est {}.</translation>
   </message>
   <message>
-   <source>{} cannot make the engine: PYTHON must be a Python of at least 3.11 with the modules venv and ensurepip.</source>
-   <translation type="unfinished" />
+   <source>The engine crashed ({}) during '{}': its last lines stand above, its whole log is {}.</source>
+   <translation>Le moteur s'est effondré ({}) pendant « {} » : ses dernières lignes sont ci-dessus, son journal entier est {}.</translation>
   </message>
   <message>
-   <source>No Python of at least 3.11 with the module venv was found: install one (on Debian: apt install python3-venv), or name it in PYTHON.</source>
-   <translation type="unfinished" />
+   <source>signal {}</source>
+   <translation>signal {}</translation>
+  </message>
+  <message>
+   <source>exit status {}</source>
+   <translation>code de sortie {}</translation>
   </message>
   <message>
    <source>STRANDLINE_PYTHON</source>
-   <translation type="unfinished" />
+   <translation>STRANDLINE_PYTHON</translation>
   </message>
   <message>
    <source>The option 'Python of the engine'</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>The engine of Strandline is not installed: {}.</source>
-   <translation type="unfinished" />
-  </message>
-  <message>
-   <source>run `make setup` in {}, or strandline:checkengine with INSTALL=true</source>
-   <translation type="unfinished" />
+   <translation>L'option « Python du moteur »</translation>
   </message>
   <message>
    <source>{} names {}, which is not there: correct or remove it.</source>
-   <translation type="unfinished" />
+   <translation>{} indique {}, qui n'existe pas : corrigez-le ou retirez-le.</translation>
+  </message>
+  <message>
+   <source>The engine in {} was made for another version of Strandline: {}.</source>
+   <translation>Le moteur dans {} a été fait pour une autre version de Strandline : {}.</translation>
+  </message>
+  <message>
+   <source>The engine of Strandline is not installed: {}.</source>
+   <translation>Le moteur de Strandline n'est pas installé : {}.</translation>
+  </message>
+  <message>
+   <source>{} cannot make the engine: PYTHON must be a Python of at least 3.11 with the modules venv and ensurepip.</source>
+   <translation>{} ne peut créer le moteur : PYTHON doit être un Python 3.11 ou plus récent avec les modules venv et ensurepip.</translation>
+  </message>
+  <message>
+   <source>No Python of at least 3.11 with the module venv was found: install one (on Debian: apt install python3-venv), or name it in PYTHON.</source>
+   <translation>Aucun Python 3.11 ou plus récent avec le module venv n'a été trouvé : installez-en un (sous Debian : apt install python3-venv), ou indiquez-le dans PYTHON.</translation>
+  </message>
+  <message>
+   <source>run `make setup` in {}, or strandline:checkengine with INSTALL=true</source>
+   <translation>lancez `make setup` dans {}, ou strandline:checkengine avec INSTALL=true</translation>
+  </message>
+  <message>
+   <source>run strandline:checkengine ('Check engine') with INSTALL=true</source>
+   <translation>lancez strandline:checkengine (« Vérifier le moteur ») avec INSTALL=true</translation>
   </message>
   <message>
    <source>The raster {} is not a file (it comes from '{}'): save it as a GeoTIFF first.</source>
-   <translation type="unfinished" />
+   <translation>Le raster {} n'est pas un fichier (il vient de « {} ») : enregistrez-le d'abord en GeoTIFF.</translation>
   </message>
   <message>
    <source>The engine's layer {} cannot be read.</source>
-   <translation type="unfinished" />
+   <translation>La couche {} du moteur ne peut être lue.</translation>
   </message>
   <message>
    <source>The layer {} cannot be written: {}.</source>
-   <translation type="unfinished" />
+   <translation>La couche {} ne peut être écrite : {}.</translation>
   </message>
   <message>
    <source>The field {} of {} cannot be handed to the engine: rename it.</source>
-   <translation type="unfinished" />
+   <translation>Le champ {} de {} ne peut être transmis au moteur : renommez-le.</translation>
   </message>
   <message>
    <source>The feature {} of {} cannot be handed to the engine.</source>
-   <translation type="unfinished" />
+   <translation>L'entité {} de {} ne peut être transmise au moteur.</translation>
   </message>
   <message>
    <source>{} is not a CRS that QGIS knows: {}.</source>
-   <translation type="unfinished" />
+   <translation>{} n'est pas un SCR que QGIS connaît : {}.</translation>
+  </message>
+  <message>
+   <source>the one that 'Check engine' installs</source>
+   <translation>celui que « Vérifier le moteur » installe</translation>
+  </message>
+  <message>
+   <source>none: this computer</source>
+   <translation>aucun : cet ordinateur</translation>
+  </message>
+  <message>
+   <source>Strandline computes in a Python of its own. Run 'Check engine' from the toolbox to install or test it.</source>
+   <translation>Strandline calcule dans un Python à part. Lancez « Vérifier le moteur » depuis la boîte à outils pour l'installer ou le tester.</translation>
+  </message>
+  <message>
+   <source>Python of the engine</source>
+   <translation>Python du moteur</translation>
   </message>
  </context>
 </TS>

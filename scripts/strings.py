@@ -20,7 +20,7 @@ def collect() -> "list[str]":
     ValueError
         When tr() is given something that cannot be collected.
     """
-    found = {}
+    found = []
     for top in ("provider", "algorithms", "bridge"):
         for path in sorted((ROOT / top).glob("*.py")):
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -28,8 +28,8 @@ def collect() -> "list[str]":
                     (argument,) = node.args
                     if not (isinstance(argument, ast.Constant) and isinstance(argument.value, str)):
                         raise ValueError(f"{path}:{node.lineno}: tr() takes one literal text")
-                    found.setdefault(argument.value, None)
-    return list(found)
+                    found.append((path, node.lineno, node.col_offset, argument.value))
+    return list(dict.fromkeys(text for *_, text in sorted(found)))
 
 
 def merge(path: Path, language: str, texts: "list[str]") -> int:
