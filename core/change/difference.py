@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -22,7 +22,8 @@ from .zones import cell_shares, touched
 
 Array = NDArray[np.float64]
 _PREVIEW = 900  # cells of the report's map along its longer side
-_STABLE_CELLS = 400_000  # of stable ground that are kept; more would tell nothing new
+_STABLE_CELLS = 300_000  # of stable ground that are kept; more would tell nothing new
+_PATCH = 32  # cells
 
 
 @dataclass(frozen=True)
@@ -71,9 +72,12 @@ class Pair:
         return change, before
 
 
-@dataclass
+@dataclass(frozen=True)
 class Stable:
-    """Cells of stable ground: number of row and column, place (m), change and sigma (n,)."""
+    """A random sample of the ``count`` cells of stable ground: row, column, place (m), change and sigma (n,).
+
+    ``patches`` are whole patches of neighbours, for what goes with distance; None when the sample is all there is.
+    """
 
     row: NDArray[np.int64]
     column: NDArray[np.int64]
@@ -82,6 +86,12 @@ class Stable:
     change: Array
     sigma: Array | None
     count: int
+    patches: Stable | None = None
+
+    def with_sigma(self, value: float) -> Stable:
+        """Return the same with one sigma for all cells."""
+        patches = None if self.patches is None else self.patches.with_sigma(value)
+        return replace(self, sigma=np.full(len(self.change), value), patches=patches)
 
 
 @dataclass
@@ -100,7 +110,7 @@ class Outcome:
 def stable_ground(pair: Pair, stable: list[Any], sigma: Sigma | None, progress: Progress) -> Stable:
     """Return the change of the cells of which at least half lies on stable ground."""
     grid = pair.grid
-    sample = Sample(_STABLE_CELLS, 6)
+    sample, patches = Sample(_STABLE_CELLS, 6), Sample(_STABLE_CELLS, 6)
     tree = shapely.STRtree(stable)
     for column, row, width, height in progress.over(pair.tiles()):
         window = grid.window(column, row, width, height)
@@ -115,10 +125,11 @@ def stable_ground(pair: Pair, stable: list[Any], sigma: Sigma | None, progress: 
         rows, columns = np.nonzero(inside & np.isfinite(change) & np.isfinite(spread))
         r, c = rows + row, columns + column
         x, y = grid.centres(r, c)
-        sample.add(r * grid.width + c, r.astype(float), c.astype(float), x, y, change[rows, columns], spread[rows, columns])
-    r, c, x, y, change, spread = sample.values.T
-    known = None if sigma is None else spread
-    return Stable(r.astype(np.int64), c.astype(np.int64), x, y, change, known, sample.count)
+        values = (r.astype(float), c.astype(float), x, y, change[rows, columns], spread[rows, columns])
+        sample.add(r * grid.width + c, *values)
+        patches.add(r * grid.width + c, *values, patches=(r // _PATCH) * grid.width + c // _PATCH)
+    found = _stable(sample, sigma is not None)
+    return found if sample.count <= _STABLE_CELLS else replace(found, patches=_stable(patches, sigma is not None))
 
 
 def difference(
@@ -182,6 +193,11 @@ def difference(
         if outcome.valid == 0:
             raise NotEnoughData("BEFORE and AFTER have no cell where both have a height: choose rasters whose data overlap.")
     return outcome
+
+
+def _stable(sample: Sample, sigma_known: bool) -> Stable:
+    r, c, x, y, change, spread = sample.values.T
+    return Stable(r.astype(np.int64), c.astype(np.int64), x, y, change, spread if sigma_known else None, sample.count)
 
 
 def _one(source: Aligned | float | None, window: Grid) -> Array:

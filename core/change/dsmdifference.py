@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -136,8 +136,8 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
                 "The sigma of the heights is not known, so no change can be called significant: "
                 "give BEFORE_SIGMA and AFTER_SIGMA, the two PRECISION rasters, or STABLE."
             )
-        if ground is not None and ground.sigma is None and sigma is not None:
-            ground = replace(ground, sigma=np.full(len(ground.change), sigma.common))
+        if ground is not None and ground.sigma is None and sigma is not None and sigma.common is not None:
+            ground = ground.with_sigma(sigma.common)
         steps = (grid.step_north, grid.cell)
         model, variogram = error_model(request.correlation_range, ground, shift, sigma is not None, steps, progress)
         systematic = systematic_error(request.registration_sigma, shift, ground, variogram, before, after, grid.crs)

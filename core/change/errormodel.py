@@ -68,8 +68,10 @@ def _standardised(ground: Stable, shift: Shift, steps: tuple[float, float]) -> V
     """Return the variogram of residual / sigma on stable ground, None where it is too small."""
     if ground.sigma is None or not (ground.sigma > 0).all():
         return None
-    residual = ground.change - shift.at(ground.x, ground.y)
-    return fit_variogram(ground.row, ground.column, residual / ground.sigma, steps)
+    cells = ground.patches or ground
+    residual = cells.change - shift.at(cells.x, cells.y)
+    assert cells.sigma is not None
+    return fit_variogram(cells.row, cells.column, residual / cells.sigma, steps)
 
 
 def _of_fit(shift: Shift, ground: Stable, variogram: Variogram) -> Fitted:

@@ -7,6 +7,7 @@ from numba import njit, vectorize
 from numpy.typing import NDArray
 
 _ALL = 2**64 - 1
+_LOW = np.uint64(2**32 - 1)
 
 
 class Sample:
@@ -22,13 +23,22 @@ class Sample:
         self.count = 0
         self.limit = _ALL  # a cell whose hash is not below this would not be kept
 
-    def add(self, cells: NDArray[np.int64], *columns: NDArray[np.float64], count: int | None = None) -> None:
+    def add(
+        self,
+        cells: NDArray[np.int64],
+        *columns: NDArray[np.float64],
+        count: int | None = None,
+        patches: NDArray[np.int64] | None = None,
+    ) -> None:
         """Add cells by their number in the grid (n,), with one value (n,) per column.
 
-        ``count`` tells how many there were when cells at or above ``limit`` have been left out already.
+        Cells of one patch (n, numbers) are kept or left together, so that neighbours stay neighbours. ``count`` tells how many
+        there were when cells at or above ``limit`` have been left out already.
         """
         self.count += len(cells) if count is None else count
         hashes = _hashes(cells.astype(np.int64))
+        if patches is not None:
+            hashes = (_hashes(patches.astype(np.int64)) & ~_LOW) | (hashes & _LOW)
         keep = hashes < np.uint64(self.limit)
         self._hashes = np.concatenate([self._hashes, hashes[keep]])
         self._values = np.concatenate([self._values, np.column_stack([c[keep] for c in columns])])

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
-_PAIRS, _LAGS, _LEAST_PAIRS = 20_000, 24, 200
+_PAIRS, _FAR_PAIRS, _LAGS, _LEAST_PAIRS = 20_000, 200_000, 24, 200
+_BAND = 0.08  # of a lag, either way
 _SEED = 20150
 
 
@@ -93,24 +94,28 @@ def _empirical(
     width = int(column.max()) + 1
     order = np.argsort(row * width + column)
     row, column, values = row[order], column[order], values[order]
-    keys = row * width + column
+    keys, count = row * width + column, len(row)
+    far = random.integers(0, count, (_FAR_PAIRS, 2))
+    apart = np.hypot(*((v[far[:, 0]] - v[far[:, 1]]) * step for v, step in zip((row, column), steps, strict=True)))
     lags, gamma, pairs = [], [], []
     for lag in wanted:
-        first = random.integers(0, len(keys), _PAIRS)
+        first = random.integers(0, count, _PAIRS)
         angle = random.uniform(0, 2 * np.pi, _PAIRS)
         r = row[first] + np.rint(lag * np.sin(angle) / steps[0]).astype(np.int64)
         c = column[first] + np.rint(lag * np.cos(angle) / steps[1]).astype(np.int64)
-        inside = (r >= 0) & (c >= 0) & (c < width)
-        key = r * width + c
-        place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
-        found = inside & (keys[place] == key) & (place != first)
-        together = np.unique(np.minimum(first, place)[found] * len(keys) + np.maximum(first, place)[found])
-        if len(together) < _LEAST_PAIRS:
+        place = np.minimum(np.searchsorted(keys, r * width + c), count - 1)
+        found = (r >= 0) & (c >= 0) & (c < width) & (keys[place] == r * width + c) & (place != first)
+        a, b = first[found], place[found]
+        # Where only some patches are at hand few cells have a partner far away, but some pairs of cells are that far apart.
+        band = far[np.abs(apart / lag - 1.0) < _BAND][:_PAIRS]
+        a, b = np.concatenate([a, band[:, 0]]), np.concatenate([b, band[:, 1]])
+        different = np.unique(np.minimum(a, b) * count + np.maximum(a, b))
+        if len(different) < _LEAST_PAIRS:
             continue
-        a, b = together // len(keys), together % len(keys)
+        a, b = different // count, different % count
         lags.append(float(np.mean(np.hypot((row[a] - row[b]) * steps[0], (column[a] - column[b]) * steps[1]))))
         gamma.append(0.5 * 2.198 * float(np.median(np.abs(values[a] - values[b]))) ** 2)
-        pairs.append(float(len(together)))
+        pairs.append(float(len(different)))
     return np.asarray(lags), np.asarray(gamma), np.asarray(pairs)
 
 

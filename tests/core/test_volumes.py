@@ -131,6 +131,17 @@ class TestSample:
         # Uniform over the cells: the mean of 500 has a sigma of 1,290.
         assert samples[0].mean() == pytest.approx(50_000, abs=4000)
 
+    def test_patches_stay_whole(self):
+        rows, columns = (v.ravel() for v in np.mgrid[0:256, 0:256])
+        sample = Sample(6400, 2)
+        for part in np.array_split(np.random.default_rng(0).permutation(256 * 256), 5):
+            patches = (rows[part] // 16) * 16 + columns[part] // 16
+            sample.add(part, rows[part].astype(float), columns[part].astype(float), patches=patches)
+        r, c = sample.values.astype(int).T
+        sizes = np.bincount((r // 16) * 16 + c // 16, minlength=256)
+        assert np.sort(sizes)[::-1][:25].tolist() == [256] * 25
+        assert (sizes > 0).sum() == 25
+
 
 class TestCorrelation:
     def test_variogram_of_a_known_field(self):
@@ -146,6 +157,22 @@ class TestCorrelation:
         assert nugget == pytest.approx(0.36, abs=0.04)
         assert sill == pytest.approx(0.64, abs=0.12)
         assert reach == pytest.approx(15.0, abs=3.0)
+
+    def test_variogram_of_patches(self):
+        """A tenth of a large area in whole patches tells what the whole tells: near pairs inside, far pairs between them."""
+        random = np.random.default_rng(3)
+        field = 0.8 * correlated_field(random, 400, 60.0) + 0.6 * random.standard_normal((400, 400))
+        rows, columns = (v.ravel() for v in np.mgrid[0:400, 0:400])
+        sample = Sample(16_000, 3)
+        patches = (rows // 16) * 400 + columns // 16
+        sample.add(rows * 400 + columns, rows.astype(float), columns.astype(float), field.ravel(), patches=patches)
+        r, c, values = sample.values.T
+        part = fit_variogram(r.astype(int), c.astype(int), values, (1.0, 1.0))
+        whole = fit_variogram(rows, columns, field.ravel(), (1.0, 1.0))
+        assert part.nugget == pytest.approx(whole.nugget, abs=0.05)
+        assert part.sill == pytest.approx(whole.sill, rel=0.25)
+        assert part.reach == pytest.approx(whole.reach, rel=0.35)
+        assert len(part.lags) > 20
 
     def test_a_long_range_is_not_resolved(self):
         rows, columns = np.nonzero(np.ones((40, 40), bool))
