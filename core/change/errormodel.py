@@ -29,19 +29,20 @@ def error_model(
     random part, which is negligible beside the other. Where the range is neither resolved nor given all cells err alike: a bound.
     """
     if not sigma_known:
-        return ErrorModel(None, None, None), None
+        return ErrorModel(None, None), None
     told = None if ground is None else _standardised(ground, shift, steps)
     if told is None:
-        return ErrorModel(1.0, None if given_range is None else 1.0, given_range), None
-    if not told.resolved:
+        structures = None if given_range is None else ((1.0, given_range),) if given_range > 0 else ()
+        return ErrorModel(1.0, structures), None
+    if np.isinf(told.reach):
         if given_range is None:
             progress.warn(
-                "STABLE is too small to resolve the range of the correlated error: all cells are taken to err alike, which is a "
-                "bound; draw larger stable areas, or give CORRELATION_RANGE."
+                "STABLE is too small to resolve the range of the correlated error: its unresolved part is taken to be alike in "
+                "all cells, which is a bound; draw larger stable areas, or give CORRELATION_RANGE."
             )
         else:
-            told = replace(told, reach=given_range)
-    return ErrorModel(float(np.sqrt(told.nugget)), float(np.sqrt(told.sill)), told.reach), told
+            told = replace(told, structures=tuple((s, given_range if np.isinf(r) else r) for s, r in told.structures))
+    return ErrorModel(float(np.sqrt(told.nugget)), tuple((float(np.sqrt(s)), r) for s, r in told.structures)), told
 
 
 def systematic_error(
@@ -85,8 +86,7 @@ def _of_fit(shift: Shift, ground: Stable, variogram: Variogram) -> Fitted:
         design,
         np.column_stack([x, y]),
         variogram.nugget * variance,
-        variogram.sill * variance,
-        variogram.reach,
+        tuple((sill * variance, reach) for sill, reach in variogram.structures),
         ground.count,
     )
     return Fitted(covariance, shift.centre)

@@ -16,7 +16,7 @@ from .difference import Outcome
 from .heights import Heights
 from .significance import coverage_factor
 from .uncertainty import ErrorModel
-from .variogram import Variogram, correlation
+from .variogram import Variogram
 from .volumes import Parts, Volume
 from .zones import Zone
 
@@ -136,9 +136,12 @@ def _volumes(report: Report, f: Findings) -> None:
     )
     report.text(f"Sigma of the heights: {f.sigma}. Level of detection: {f.method}, {100 * f.confidence:g} %, two-sided.")
     m = f.model
-    if m.reach is not None and m.correlated is not None:
-        over = f"over {m.reach:.3g} m" if np.isfinite(m.reach) else "over the whole area (a bound: the range is not resolved)"
-        report.text(f"Of each cell's sigma, {m.random or 0:.3f} is random and {m.correlated:.3f} correlated {over}.")
+    if m.random is not None and m.structures is not None:
+        parts = [f"{m.random:.3f} random"]
+        for factor, reach in m.structures:
+            over = f"over {reach:.3g} m" if np.isfinite(reach) else "over the whole area (a bound: the range is not resolved)"
+            parts.append(f"{factor:.3f} correlated {over}")
+        report.text(f"Times each cell's sigma: {', '.join(parts)}.")
 
 
 def _stable(report: Report, f: Findings) -> None:
@@ -213,8 +216,9 @@ def _variogram(v: Variogram) -> Any:
     lags = np.asarray(v.lags)
     axes.plot(lags, v.gamma, "o", color="#8a7a55", label="stable ground")
     h = np.geomspace(lags[0], lags[-1], 200)
-    if v.resolved:
-        axes.plot(h, v.nugget + v.sill * (1 - correlation(h, v.reach)), color="black", label=f"spherical, range {v.reach:.3g} m")
+    ranges = ", ".join(f"{reach:.3g} m" if np.isfinite(reach) else "not resolved" for _, reach in v.structures) or "none"
+    if np.isfinite(v.reach):
+        axes.plot(h, v.at(h), color="black", label=f"spherical, range {ranges}")
     axes.set(xscale="log", xlabel="distance (m)", ylabel="half squared difference (sigma^2)", ylim=(0, None))
     axes.legend()
     return figure

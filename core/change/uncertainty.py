@@ -22,13 +22,12 @@ SAMPLE = 2500  # cells of a zone whose pairs are summed
 class ErrorModel:
     """How the cells' sigmas divide.
 
-    A cell's random sigma is ``random`` times its sigma, its correlated one ``correlated`` times, over the range ``reach``
-    (m; inf: all alike). None: not known.
+    A cell's random sigma is ``random`` times its sigma; each structure of the correlated error is a factor of the cell's sigma
+    and a range (m; inf: all cells err alike). None: not known.
     """
 
     random: float | None
-    correlated: float | None
-    reach: float | None
+    structures: tuple[tuple[float, float], ...] | None
 
 
 class Systematic(Protocol):
@@ -76,11 +75,11 @@ def correlated_variance(sample: Array, count: int, squares: float, reach: float)
     return squares + max(0.0, pairs) * (count * (count - 1.0)) / (m * (m - 1.0))
 
 
-def fit_covariance(design: Array, place: Array, nugget: float, sill: float, reach: float, count: int) -> Array:
+def fit_covariance(design: Array, place: Array, nugget: float, structures: tuple[tuple[float, float], ...], count: int) -> Array:
     """Return the covariance (p, p) of a least-squares fit on ``count`` cells with correlated errors.
 
     ``design`` (m, p) and ``place`` (m, 2) are a random sample of the cells. Cov = N^-1 X' Sigma X N^-1 with N = X'X and
-    Sigma = nugget I + sill rho.
+    Sigma = nugget I + the sum of sill rho over the ``structures`` (sill, range).
     """
     m, p = design.shape
     inverse = np.linalg.inv(design.T @ design / m)
@@ -90,10 +89,12 @@ def fit_covariance(design: Array, place: Array, nugget: float, sill: float, reac
         for k in range(i, p):
             left, right = np.ascontiguousarray(design[:, i]), np.ascontiguousarray(design[:, k])
             same = float(left @ right)
-            if sill > 0 and reach > 0 and m > 1:
-                different = (left.sum() * right.sum() - same) if np.isinf(reach) else pair_sum(x, y, left, right, reach)
-                inner[i, k] = sill * different / (m * (m - 1.0)) * (1.0 - 1.0 / count)
-            inner[i, k] += (nugget + sill) * same / m / count
+            inner[i, k] = nugget * same / m / count
+            for sill, reach in structures:
+                inner[i, k] += sill * same / m / count
+                if reach > 0 and m > 1:
+                    different = left.sum() * right.sum() - same if np.isinf(reach) else pair_sum(x, y, left, right, reach)
+                    inner[i, k] += sill * different / (m * (m - 1.0)) * (1.0 - 1.0 / count)
             inner[k, i] = inner[i, k]
     return np.asarray(inverse @ inner @ inverse)
 

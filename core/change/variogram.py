@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,27 +12,36 @@ from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
 _PAIRS, _FAR_PAIRS, _LAGS, _LEAST_PAIRS = 20_000, 200_000, 24, 200
+_RANGES = 28  # candidates
 _BAND = 0.08  # of a lag, either way
 _SEED = 20150
 
 
 @dataclass(frozen=True)
 class Variogram:
-    """``nugget`` and ``sill`` are variances (the sill without the nugget), ``reach`` the range (m); inf where it is not resolved.
+    """Variances: the ``nugget``, and nested ``structures`` of sill and range (m); a range that is not resolved is inf.
 
     ``lags`` (m) and ``gamma`` are the empirical values it was fitted to.
     """
 
     nugget: float
-    sill: float
-    reach: float
+    structures: tuple[tuple[float, float], ...]
     lags: tuple[float, ...] = ()
     gamma: tuple[float, ...] = ()
 
     @property
-    def resolved(self) -> bool:
-        """Whether the range is known."""
-        return bool(np.isfinite(self.reach))
+    def sill(self) -> float:
+        """The sills together, without the nugget."""
+        return sum(sill for sill, _ in self.structures)
+
+    @property
+    def reach(self) -> float:
+        """The longest range; 0 without correlation."""
+        return max((reach for _, reach in self.structures), default=0.0)
+
+    def at(self, lag: Array) -> Array:
+        """Return the model's half variogram at lags above zero; a structure without a known range does not count."""
+        return self.nugget + sum((s * (1.0 - correlation(lag, r)) for s, r in self.structures), np.zeros(np.shape(lag)))
 
 
 def correlation(distance: Array | float, reach: float) -> Array:
@@ -51,8 +61,8 @@ def fit_variogram(
 ) -> Variogram | None:
     """Return the variogram of ``values`` (n,) on cells ``row``, ``column`` (n,) of ``steps`` (rows, columns; m); None if too few.
 
-    Half of Dowd's (1984) robust 2.198 median(d)^2 at log-spaced lags, from random pairs; fitted by a nugget and a spherical sill,
-    not negative, for the best of many ranges up to half the area's extent. A range at that end is not resolved.
+    Half of Dowd's (1984) robust 2.198 median(d)^2 at log-spaced lags, from random pairs; fitted by a nugget and one or two
+    spherical sills, not negative, for the best of many ranges up to half the area's extent. A range at that end is not resolved.
     """
     if len(values) < 100:
         return None
@@ -64,26 +74,33 @@ def fit_variogram(
     lags, gamma, pairs = _empirical(row, column, values, steps, wanted)
     if len(lags) < 5:
         return None
-    reaches = np.geomspace(1.5 * shortest, lags[-1], 60)
-    nugget, sill, reach = _spherical(lags, gamma, np.sqrt(pairs), reaches)
+    reaches = np.geomspace(1.5 * shortest, lags[-1], _RANGES)
+    weight = np.sqrt(pairs)
+    nugget, structures = _nested(lags, gamma, weight, reaches)
     for _ in range(3):
         # The scatter of an empirical value goes with the true one, which is the model's, not its own.
-        expected = nugget + sill * (1.0 - correlation(lags, reach))
-        nugget, sill, reach = _spherical(
-            lags, gamma, np.sqrt(pairs) / np.maximum(expected, 1e-9 * max(gamma.max(), 1e-30)), reaches
-        )
-    unresolved = sill > 0 and reach >= reaches[-2]
-    return Variogram(nugget, sill, np.inf if unresolved else reach, tuple(lags.tolist()), tuple(gamma.tolist()))
+        expected = np.maximum(Variogram(nugget, structures).at(lags), 1e-9 * max(float(gamma.max()), 1e-30))
+        nugget, structures = _nested(lags, gamma, weight / expected, reaches)
+    told = tuple((sill, np.inf if reach >= reaches[-2] else reach) for sill, reach in structures)
+    return Variogram(nugget, told, tuple(lags.tolist()), tuple(gamma.tolist()))
 
 
-def _spherical(lags: Array, gamma: Array, weight: Array, reaches: Array) -> tuple[float, float, float]:
-    """Return nugget, sill and range of the weighted least squares over ``reaches``."""
-    fits = []
-    for reach in reaches:
-        model = np.column_stack([np.ones(len(lags)), 1.0 - correlation(lags, float(reach))])
-        (nugget, sill), misfit = nnls(model * weight[:, None], gamma * weight)
-        fits.append((float(misfit), float(nugget), float(sill), float(reach)))
-    return min(fits)[1:]
+def _nested(lags: Array, gamma: Array, weight: Array, reaches: Array) -> tuple[float, tuple[tuple[float, float], ...]]:
+    """Return the nugget and one or two structures of the weighted least squares; two only where they halve the squared misfit."""
+    parts = np.column_stack([np.ones(len(lags)), *(1.0 - correlation(lags, float(r)) for r in reaches)]) * weight[:, None]
+    wanted = gamma * weight
+
+    def best(choices: Iterable[tuple[int, ...]]) -> tuple[float, list[float], tuple[int, ...]]:
+        fits = []
+        for choice in choices:
+            sills, misfit = nnls(parts[:, [0, *(i + 1 for i in choice)]], wanted)
+            fits.append((float(misfit) ** 2, sills.tolist(), choice))
+        return min(fits)
+
+    count = range(len(reaches))
+    one, two = best((i,) for i in count), best((i, k) for i in count for k in count if k > i + 2)
+    _, (nugget, *sills), choice = two if two[0] < 0.5 * one[0] else one
+    return nugget, tuple((sill, float(reaches[i])) for sill, i in zip(sills, choice, strict=True) if sill > 0)
 
 
 def _empirical(

@@ -79,11 +79,10 @@ class _Sum:
         random = correlated = None
         if known and model.random is not None:
             random = cell_area * model.random * float(np.sqrt(self.squares))
-        if known and model.correlated is not None and model.reach is not None:
-            correlated = 0.0
-            if model.correlated > 0 and model.reach > 0:
-                variance = correlated_variance(self.sample.values, self.sample.count, self.squares, model.reach)
-                correlated = cell_area * model.correlated * float(np.sqrt(variance))
+        if known and model.structures is not None:
+            sample, count = self.sample.values, self.sample.count
+            variance = sum(f * f * correlated_variance(sample, count, self.squares, reach) for f, reach in model.structures)
+            correlated = cell_area * float(np.sqrt(variance))
         systematic = None if shift_sigma is None else cell_area * self.weight * shift_sigma
         return Parts(random, correlated, systematic)
 

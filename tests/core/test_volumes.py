@@ -174,10 +174,23 @@ class TestCorrelation:
         assert part.reach == pytest.approx(whole.reach, rel=0.35)
         assert len(part.lags) > 20
 
+    def test_nested_ranges(self):
+        """Two structures ten times apart are both found."""
+        found = []
+        rows, columns = (v.ravel() for v in np.mgrid[0:300, 0:300])
+        for seed in range(5):
+            random = np.random.default_rng(seed)
+            field = 0.6 * correlated_field(random, 300, 6.0) + 0.8 * correlated_field(random, 300, 60.0)
+            variogram = fit_variogram(rows, columns, field.ravel(), (1.0, 1.0))
+            found.append([variogram.at(np.array([h]))[0] for h in (3.0, 8.0, 30.0)])
+        truth = [0.36 * (1 - correlation(h, 6.0)) + 0.64 * (1 - correlation(h, 60.0)) for h in (3.0, 8.0, 30.0)]
+        # Some 25 independent patches of the long structure in each field.
+        np.testing.assert_allclose(np.median(found, axis=0), truth, rtol=0.12)
+
     def test_a_long_range_is_not_resolved(self):
         rows, columns = np.nonzero(np.ones((40, 40), bool))
         slope = columns / 40.0
-        assert not fit_variogram(rows, columns, slope, (1.0, 1.0)).resolved
+        assert np.isinf(fit_variogram(rows, columns, slope, (1.0, 1.0)).reach)
         assert fit_variogram(rows[:50], columns[:50], slope[:50], (1.0, 1.0)) is None
 
     def test_pure_noise_has_no_sill(self):
@@ -211,7 +224,7 @@ class TestCorrelation:
     def test_stable_ground_of_15_by_40_metres(self):
         """3 cm sill, 20 m range: the shift keeps 1.45 cm, whatever the number of cells."""
         x, y = (v.ravel() for v in np.meshgrid(np.arange(0.25, 15, 0.5), np.arange(0.25, 40, 0.5)))
-        covariance = fit_covariance(np.ones((len(x), 1)), np.column_stack([x, y]), 0.0, 0.03**2, 20.0, len(x))
+        covariance = fit_covariance(np.ones((len(x), 1)), np.column_stack([x, y]), 0.0, ((0.03**2, 20.0),), len(x))
         assert np.sqrt(covariance[0, 0]) == pytest.approx(0.0145, abs=0.0002)
         assert Fitted(covariance, (0.0, 0.0)).sigma(5.0, 5.0, 0.0, 0.0) == pytest.approx(0.0145, abs=0.0002)
 
@@ -222,7 +235,7 @@ class TestCorrelation:
         centre = (x.mean(), y.mean())
         design = np.column_stack([np.ones(len(x)), x - centre[0], y - centre[1]])
         pick = np.random.default_rng(0).permutation(len(x))[:1500]
-        covariance = fit_covariance(design[pick], np.column_stack([x, y])[pick], 0.0, 1.0, 12.0, len(x))
+        covariance = fit_covariance(design[pick], np.column_stack([x, y])[pick], 0.0, ((1.0, 12.0),), len(x))
         predicted = Fitted(covariance, centre).sigma(100.0, 30.0, 0.0, 0.0)
         random = np.random.default_rng(1)
         g = np.array([1.0, 100.0 - centre[0], 30.0 - centre[1]])
