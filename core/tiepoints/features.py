@@ -18,7 +18,7 @@ from ..files import whole
 
 VERSION = 1  # part of the key under which features are kept: raise it when the same image would give others
 _LAYERS = 3  # scales per octave, as Lowe's
-_CONTRAST = 0.01  # a quarter of OpenCV's default: sand has little; the grid keeps the best of what is found
+_CONTRAST = 0.002  # a twentieth of OpenCV's default: sand has little; the grid keeps the best of what is found
 _EDGE = 10.0
 _SIGMA = 1.6
 _CELLS = 32  # cells along the longer side among which the features are shared out
@@ -119,6 +119,4 @@ def read_features(path: Path) -> Features:
         with np.load(path, allow_pickle=False) as data:
             return Features(data["xy"], data["scale"], data["angle"], data["descriptors"])
     except (OSError, ValueError, KeyError) as error:
-        raise InputError(
-            f"The features {path} cannot be read ({error}): delete the file and run strandline:tiepoints."
-        ) from error
+        raise InputError(f"The features {path} cannot be read ({error}): delete them and run strandline:tiepoints.") from error
