@@ -24,7 +24,7 @@ MOST_VIEWS = 8
 SMALL, LARGE = 2, 4  # half sizes of the two windows that an adaptive one is mixed of
 NOISE = 0.5  # variance in 8-bit grey levels under which texture counts as noise: a JPEG's rounding and its sensor's rest
 KNEE = 24.0  # times the noise: where the small and the large window count alike
-P_SMALL, P_LARGE = 0.015, 0.35  # penalties at REGULARITY 1 for a change of one step, and for a jump
+P_SMALL, P_LARGE = 0.02, 1.0  # penalties at REGULARITY 1 for a change of one step, and for a jump
 
 _pictures = Pictures()  # one cache per process: tiles that follow each other share photographs
 

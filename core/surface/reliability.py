@@ -11,7 +11,8 @@ Floats = NDArray[np.float32]
 _LEAST = 0.2  # of the score, when so many views and cells take part that chance plays no role
 _CHANCE = 2.3  # standard deviations of the score of noise, on top
 _UNSURE = 0.5  # share of the neighbourhood where the plain best is another height than the regularised
-_SCATTER = 1.0  # steps that heights may scatter about the median of their neighbours, which follows straight edges
+_SCATTER = 0.35  # steps per view by which a height may differ from the median of its neighbours, which follows edges
+_RESTLESS = 0.35  # share of the neighbourhood that may differ by more
 _SPECKLE = 400  # cells, five windows; smaller islands, in height or all alone, are removed
 
 
@@ -22,7 +23,7 @@ def believable(
 
     At least two views; a score above what chance gives (the mean correlation of m views of noise over n independent
     samples has the standard deviation sqrt(2 / (m (m - 1) n))); a neighbourhood where the plain best height mostly is the
-    regularised one; heights that do not scatter from cell to cell, as those of leaves and of ripples do; and not an island of few
+    regularised one; heights that do not scatter from cell to cell, as those of leaves and of ripples do (where many views agree more is believed); and not an island of few
     cells.
     """
     m = np.maximum(views.astype(np.float32), 2)
@@ -31,7 +32,8 @@ def believable(
     enough = (views >= 2) & np.isfinite(sigma)
     around = _mean(score, enough, 5)
     sure = _mean((doubt <= 2).astype(np.float32), enough, 7)
-    calm = _mean((height - cv2.medianBlur(height, 5)) ** 2, enough, 9) <= (_SCATTER * step) ** 2
+    apart = np.abs(height - cv2.medianBlur(height, 5)) > _SCATTER * views * step
+    calm = _mean(apart.astype(np.float32), enough, 9) <= _RESTLESS
     good = enough & calm & (around >= _LEAST + _CHANCE * chance) & (score >= 0.5 * _LEAST) & (sure >= _UNSURE)
     return good & ~_speckles(height, good, step)
 
@@ -43,7 +45,7 @@ def _mean(values: Floats, where: NDArray[np.bool_], size: int) -> Floats:
 
 
 def _speckles(height: Floats, good: NDArray[np.bool_], step: float) -> NDArray[np.bool_]:
-    """Tell which of the good cells belong to islands: ``_SPECKLE`` cells at most, alone or three steps apart from their neighbours."""
+    """Tell which good cells belong to islands: ``_SPECKLE`` cells at most, alone or three steps apart from what is around."""
     if not good.any():
         return np.zeros_like(good)
     _, labels, boxes, _ = cv2.connectedComponentsWithStats(good.astype(np.uint8), connectivity=4)
