@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tempfile
 import textwrap
 from pathlib import Path
 
@@ -29,6 +30,15 @@ def qgis():
     plugin.initProcessing()
     yield registry
     plugin.unload()
+
+
+@pytest.fixture(autouse=True)
+def _own_temporary_folder(tmp_path, monkeypatch):
+    """Keep the logs that crashes leave, on purpose, out of everybody's folder."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setenv("TMPDIR", str(folder))
 
 
 @pytest.fixture
@@ -81,7 +91,12 @@ def qgis_process(tmp_path_factory):
         @staticmethod
         def run(*words, **more):
             told = subprocess.run(
-                [program, *words], env={**environment, **more}, capture_output=True, text=True, timeout=300, check=False
+                [program, *words],
+                env={**environment, "TMPDIR": tempfile.gettempdir(), **more},
+                capture_output=True,
+                text=True,
+                timeout=300,
+                check=False,
             )
             return told.returncode, told.stdout, told.stderr
 

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -96,10 +97,8 @@ def test_the_engine_gets_the_request_and_its_result_comes_back(door, fake_engine
     assert feedback.errors == []
 
 
-def test_nothing_is_left_behind(door, fake_engine, feedback, tmp_path, monkeypatch):
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(temporary))
+def test_nothing_is_left_behind(door, fake_engine, feedback):
+    temporary = Path(tempfile.gettempdir())
     before = children()
     python = fake_engine("say(type='result', result={})")
     door.run_step(str(python), "enhance", {}, feedback)
@@ -262,7 +261,7 @@ def test_a_killed_qgis_takes_engine_and_workers_along(qgis_process, tmp_path, en
     script.chmod(0o755)
     process = subprocess.Popen(
         [qgis_process.command, "run", "strandline:checkengine"],
-        env={**qgis_process.env, "STRANDLINE_PYTHON": str(script)},
+        env={**qgis_process.env, "STRANDLINE_PYTHON": str(script), "TMPDIR": tempfile.gettempdir()},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
