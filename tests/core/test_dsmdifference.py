@@ -14,6 +14,7 @@ from strandline.core.change.dsmdifference import Request, run
 from strandline.core.contract import RasterSource, VectorSource
 from strandline.core.errors import Cancelled, InputError, NotEnoughData
 from strandline.core.progress import Progress
+from strandline.core.vector import write_layer
 
 WEST, NORTH = 300_000.0, 5_774_000.0
 FOOT = 1200 / 3937
@@ -103,6 +104,15 @@ class TestVolumesByHand:
         assert b["net"] == pytest.approx(4 * 0.25)
         assert result.net == pytest.approx(4 * 3.25)
         assert result.area == pytest.approx(24.0)
+
+    def test_zones_of_another_crs(self, step, pair, make_polygons):
+        from pyproj import Transformer
+
+        change = Transformer.from_crs("EPSG:32755", "EPSG:32754", always_xy=True)
+        box = shapely.transform(shapely.box(1, -3, 5, 0), lambda xy: np.column_stack(change.transform(*(xy + (WEST, NORTH)).T)))
+        result = step(*pair, zones=make_polygons("zones", [box], crs="EPSG:32754", absolute=True))
+        assert result.net == pytest.approx(4 * (0.5 + 0.5 + 0.5 - 0.25 + 0.0625), abs=1e-6)
+        assert result.area == pytest.approx(12.0, abs=1e-6)
 
     def test_uncovered_ground_is_not_filled(self, step, pair, make_polygons, tmp_path):
         zones = make_polygons("zones", [shapely.box(4, -6, 12, -4), shapely.box(50, -6, 60, -4)], {"name": ["edge", "off"]})
@@ -392,6 +402,11 @@ class TestBadInput:
         refused(InputError, "STABLE does not lie", good, good, stable=far)
         refused(InputError, "has no field", good, good, zones=near, zone_field="kind")
         refused(InputError, "has no polygons", good, good, zones=make_polygons("empty", []))
+        line = str(tmp_path / "line.gpkg")
+        write_layer(
+            line, "line", "EPSG:32755", {"id": [1]}, [shapely.LineString([(WEST, NORTH), (WEST + 9, NORTH - 9)])], "LineString"
+        )
+        refused(InputError, "not a polygon", good, good, zones=VectorSource(line, "line"))
         refused(InputError, "cannot be read", good, good, zones=VectorSource(str(tmp_path / "no.gpkg"), "no"))
 
     def test_parameters(self, refused, good, make_polygons, tmp_path):
