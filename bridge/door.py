@@ -48,8 +48,11 @@ def run_step(python: str, step: str, request: Mapping[str, Any], feedback: Any) 
         try:
             with Child(command, cleaned(os.environ), log) as child:
                 for text in child.lines(feedback):
-                    last = _pass_on(text, feedback) or last
-                status = child.wait(feedback)
+                    last = _pass_on(text, feedback)
+                    if last:
+                        break  # all is done and written: nothing the interpreter does on its way out may undo that
+                else:
+                    status = child.wait(feedback)
         except OSError as error:
             raise EngineError(tr("The engine's Python {} cannot be started: {}.").format(python, error)) from error
         if last.get("type") == "result":

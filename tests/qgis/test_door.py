@@ -109,6 +109,15 @@ def test_nothing_is_left_behind(door, fake_engine, feedback):
     assert children() == before
 
 
+def test_a_result_stands_whatever_the_engine_does_on_its_way_out(door, fake_engine, feedback):
+    start = time.monotonic()
+    python = fake_engine("say(type='result', result={'output': '/x'})\ntime.sleep(60)")
+    assert door.run_step(str(python), "orient", {}, feedback) == {"output": "/x"}
+    assert time.monotonic() - start < PROMPT
+    python = fake_engine("say(type='result', result={'output': '/x'})\nos.kill(os.getpid(), signal.SIGSEGV)")
+    assert door.run_step(str(python), "orient", {}, feedback) == {"output": "/x"}
+
+
 def test_a_bug_keeps_its_traceback(door, fake_engine, feedback):
     python = fake_engine("say(type='error', kind='Bug', text='KeyError: 7', traceback='Traceback: here')\nsys.exit(2)")
     with pytest.raises(door.EngineError, match=r"fault of Strandline in 'orient': KeyError: 7") as error:
