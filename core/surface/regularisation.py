@@ -107,7 +107,9 @@ def decide(
     for r in range(rows):
         for c in range(columns):
             o, n = offset[r, c], count[r, c]
-            best, plain = 0, 0
+            # Among equals the base wins: where nothing speaks, the surface stays.
+            best = min(max(-first[r, c], 0), n - 1)
+            plain = best
             for k in range(n):
                 if total[o + k] < total[o + best]:
                     best = k

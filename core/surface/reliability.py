@@ -23,8 +23,8 @@ def believable(
 
     At least two views; a score above what chance gives (the mean correlation of m views of noise over n independent
     samples has the standard deviation sqrt(2 / (m (m - 1) n))); a neighbourhood where the plain best height mostly is the
-    regularised one; heights that do not scatter from cell to cell, as those of leaves and of ripples do (where many views agree more is believed); and not an island of few
-    cells.
+    regularised one; heights that do not scatter from cell to cell, as those of leaves and of ripples do (where many views
+    agree more is believed); and not an island of few cells.
     """
     m = np.maximum(views.astype(np.float32), 2)
     # Half of a window's cells are independent: resampling correlates neighbours.
