@@ -36,6 +36,7 @@ class Builder:
 
     def __init__(self, title, text):
         self.model = QgsProcessingModelAlgorithm(title, "Models", "models")
+        self._asked = []
         self._help = {"ALG_DESC": text, "ALG_CREATOR": "Strandline"}
         self._column, self._row = 0, 0
 
@@ -74,6 +75,7 @@ class Builder:
     def save(self, file):
         """Check the model and write it."""
         self.model.setHelpContent(self._help)
+        self.model.setParameterOrder(self._asked)  # else the dialog asks by the alphabet
         self.model.updateDestinationParameters()
         fine, told = self.model.validate()
         if not fine:
@@ -86,6 +88,7 @@ class Builder:
         """Make an input like ``definition`` unless there is one; return its name."""
         name, label = f"{prefix}{definition.name()}", f"{definition.description()}{suffix}"
         if self.model.parameterDefinition(name) is None:
+            self._asked.append(name)
             self._help[name] = definition.help()
             copy = definition.clone()
             copy.setName(name)
