@@ -45,7 +45,7 @@ def lay_targets(beach: Beach, after: bool, control: int, check: int, side: float
     InputError
         When the area is too small for so many.
     """
-    count, margin = control + check, 1.5 * side
+    count, margin = control + check, side
     if not count:
         return Targets([], [], np.empty((0, 3)), np.empty(0))
     if min(beach.length, beach.width) <= 2 * margin:
@@ -60,7 +60,7 @@ def lay_targets(beach: Beach, after: bool, control: int, check: int, side: float
     for k in range(count):
         wanted = -np.hypot(*(places - corners[k]).T) if k < len(corners) else nearest
         best = int(np.argmax(wanted)) if len(places) else -1
-        if best < 0 or nearest[best] < 3 * side:
+        if best < 0 or nearest[best] < 2 * side:
             raise InputError(f"The area has no room for {count} targets of {side:.1f} m: ask for fewer, or enlarge the area.")
         chosen.append(best)
         nearest = np.minimum(nearest, np.hypot(*(places - places[best]).T))

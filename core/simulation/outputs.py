@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from pyproj import CRS
 
 from ..block import View
 from ..camera import Camera
@@ -18,7 +19,7 @@ from ..files import write_json
 from ..vector import write_layer
 from . import truth
 from .ground import SIGMA_H, SIGMA_V, Mark, Targets
-from .placement import DEFAULT_CRS, Placement
+from .placement import Placement
 from .terrain import Beach
 
 Array = NDArray[np.float64]
@@ -26,9 +27,7 @@ Array = NDArray[np.float64]
 _STAMP = "2024-01-01T00:00:00.000Z"  # a GeoPackage holds the time it was made; the same seed is to give the same bytes
 
 
-def write_ground(
-    folder: Path, placement: Placement, crs: str | None, targets: Targets, measured: Array, marks: list[Mark]
-) -> None:
+def write_ground(folder: Path, placement: Placement, targets: Targets, measured: Array, marks: list[Mark]) -> None:
     """Write gcps.gpkg (with the coordinates ``measured`` (n, 3) in the CRS), marks.csv and gcp_list.txt."""
     count = len(targets.names)
     sigmas = {"sigma_h": [SIGMA_H] * count, "sigma_v": [SIGMA_V] * count}
@@ -38,7 +37,9 @@ def write_ground(
     rows = [(m.gcp, m.image, f"{m.x:.3f}", f"{m.y:.3f}") for m in marks]
     _write_csv(folder / "marks.csv", ("gcp", "image", "x", "y"), rows)
     place = dict(zip(targets.names, measured, strict=True))
-    lines = [(crs or DEFAULT_CRS).replace("\n", " ")]
+    crs = CRS(placement.frame.crs)
+    code = crs.to_epsg()
+    lines = [f"EPSG:{code}" if code else " ".join(crs.to_wkt().split())]
     for m in marks:
         x, y, z = place[m.gcp]
         # ODM counts from the centre of the top-left pixel.

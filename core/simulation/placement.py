@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from pyproj import Transformer
+from pyproj import CRS, Transformer
 
 from ..errors import InputError
 from ..frames import LocalFrame, projected_crs
@@ -43,7 +43,8 @@ class Placement:
         definition = projected_crs(crs or DEFAULT_CRS)
         place = _DEFAULT_PLACE
         if crs:
-            area = definition.area_of_use
+            code = definition.to_epsg()  # WKT may have lost the area, its code tells
+            area = definition.area_of_use or (CRS.from_epsg(code).area_of_use if code else None)
             if area is None:
                 raise InputError(f"The CRS {definition.name} does not say where it applies: choose one with an EPSG code.")
             if not (area.west <= place[0] <= area.east and area.south <= place[1] <= area.north):

@@ -112,7 +112,7 @@ def produce(request: Request, beach: Beach, folder: Path, progress: Progress) ->
         random = _random(request, date.number, _MARKS)
         marks = ground.mark(date.targets, date.views, _scene(setting, date, f), random)
         measured = ground.measure(date.targets, setting.placement, _random(request, date.number, _SURVEY))
-        outputs.write_ground(folder / date.day, setting.placement, request.crs, date.targets, measured, marks)
+        outputs.write_ground(folder / date.day, setting.placement, date.targets, measured, marks)
         remove(Path(f.folder))
     (folder / "truth").mkdir()
     volumes = truth.write_truth(folder / "truth", setting.placement, beach, len(dates))

@@ -14,7 +14,7 @@ from ..survey import held
 from .terrain import Beach
 
 _FILE = "simulation.json"
-_VERSION = 2  # of what the same parameters give
+_VERSION = 3  # of what the same parameters give
 _SIDECARS = (".aux.xml", "-wal", "-shm", "-journal", ".qmd", ".qml")  # what looking at the files may add
 
 
@@ -80,7 +80,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     _validate(request)
     parameters = {k: v for k, v in asdict(request).items() if k not in ("output", "workers", "scheduler", "output_html_file")}
     fingerprint = digest(_VERSION, parameters)
-    output = Path(request.output)
+    output = Path(request.output).absolute()
     standing = _standing(output)
     if standing is not None and standing["fingerprint"] == fingerprint and _complete(output, standing["files"]):
         progress.info(f"{output} holds this simulation already: it is kept.")

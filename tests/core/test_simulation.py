@@ -1,6 +1,7 @@
 """The simulated beach: terrain, frames, flight, rays, sensor. Exact numbers first."""
 
 import math
+import re
 
 import cv2
 import numpy as np
@@ -110,6 +111,9 @@ def test_truth_on_the_grid_is_the_surface_the_cameras_see() -> None:
 def test_placement_of_another_crs_lies_where_that_applies() -> None:
     placement = Placement.of(BEACH, "EPSG:2154")
     assert CRS(placement.frame.crs).to_epsg() == 2154
+    bare = re.sub(r",USAGE\[.*?\]\](?=,ID)", "", CRS("EPSG:2154").to_wkt(), flags=re.DOTALL)
+    assert CRS(bare).area_of_use is None
+    assert Placement.of(BEACH, bare).frame.longitude == placement.frame.longitude
     far = Placement.of(BEACH, "EPSG:28356")  # Australia
     assert 150 < far.frame.longitude < 156
     with pytest.raises(InputError, match="projected"):
@@ -286,13 +290,14 @@ def test_targets_lie_apart_on_ground_that_can_hold_them() -> None:
     assert targets.roles == ["control"] * 6 + ["check"] * 4
     a, c, z = targets.points.T
     assert_allclose(z, BEACH.heights(a, c, False))
-    assert ((a > 2) & (a < 58) & (c > 2) & (c < 38)).all()
+    assert ((a > 1.4) & (a < 58.6) & (c > 1.4) & (c < 38.6)).all()
     apart = np.hypot(a[:, None] - a, c[:, None] - c)[np.triu_indices(10, 1)]
-    assert apart.min() > 3 * 1.4
-    # The six control points span most of the area.
+    assert apart.min() > 2 * 1.4
+    # The first four lie in the corners.
+    assert np.hypot(a[:4] - [0, 60, 60, 0], c[:4] - [0, 40, 0, 40]).max() < 4
     assert np.ptp(a[:6]) > 45
     assert np.ptp(c[:6]) > 28
     with pytest.raises(InputError, match="no room"):
         ground.lay_targets(BEACH, False, 190, 10, 2.5, np.random.default_rng(3))
     with pytest.raises(InputError, match="too small"):
-        ground.lay_targets(Beach(10, 10, 0.04, 1), False, 3, 0, 4.0, np.random.default_rng(3))
+        ground.lay_targets(Beach(10, 10, 0.04, 1), False, 3, 0, 6.0, np.random.default_rng(3))
