@@ -171,7 +171,7 @@ def _local_contrast(
             x = float(values[rows[k], c])
             inner_1[c] += x
             inner_2[c] += x * x
-    sigmas, belows, count = 0.0, 0.0, 0.0
+    sigmas, under_floor, count = 0.0, 0.0, 0.0
     for r in range(height):
         entering = values[rows[r + window - 1]]
         for c in range(width):
@@ -220,11 +220,11 @@ def _local_contrast(
             for c in range(width):
                 variance = sum_2[c] * share - (sum_1[c] * share) ** 2
                 sigmas += math.sqrt(max(variance, 0.0))
-                belows += 1.0 if variance < floor * floor else 0.0
+                under_floor += 1.0 if variance < floor * floor else 0.0
             count += width
         leaving = values[rows[r]]
         for c in range(width):
             x = float(leaving[c])
             inner_1[c] -= x
             inner_2[c] -= x * x
-    return sigmas, belows, count
+    return sigmas, under_floor, count
