@@ -27,8 +27,9 @@ lint: setup ## style, types and spelling
 	cd .build/plugins && "$(CURDIR)/$(ENGINE)/mypy" --config-file "$(CURDIR)/pyproject.toml" -p strandline.core
 	$(ENGINE)/codespell
 
-bench: setup ## benchmarks; their numbers go to the terminal
-	$(ENGINE)/python -m pytest tests/benchmarks -s
+bench: setup ## speed and memory, beside a peer in the same run
+	@peer=../shared/peers/dsm_sketch_kernels.py; [ -f $$peer ] || peer=; $(ENGINE)/python tests/benchmarks/bench_surface.py $$peer
+	@$(ENGINE)/python tests/benchmarks/bench_difference.py
 
 strings: ## collect the words to translate into i18n/*.ts
 	$(QGIS_PYTHON) scripts/strings.py
