@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -22,12 +23,14 @@ from ..camera import Camera
 from ..errors import NotEnoughData
 from ..progress import Progress
 from ..tiepoints.thinning import thinned
+from .merging import join
 
 SEED = 1
 _THIN = 1000  # observations or more that each photograph keeps for the mapping
 _LEAST = 12  # points from which a photograph's pose is accepted: what a small common corner gives
 _ERROR = 6.0 / 2000.0  # of the longer side: what a point may be off while the distortion is not known
 _ANGLE = 1.5  # degrees: rays that meet at less tell no depth
+_NARROW = 3.0  # degrees between the rays of a first pair, when no pair has more
 _GROWTH = 1.3  # photographs or points between two adjustments of the whole block
 
 
@@ -87,7 +90,7 @@ def map_photographs(
         _thin(copy, network, given)
         # COLMAP wants a folder of images only to colour points, which is not asked for.
         if mapper == "global":
-            return _ranked(pycolmap.global_mapping(copy, folder, folder, _global_options(given)))
+            return _joined(copy, pycolmap.global_mapping(copy, folder, folder, _global_options(given)))
         options = _incremental_options(network, given)
         registered = 0
 
@@ -98,7 +101,13 @@ def map_photographs(
 
         progress.at(0.0)
         with quiet():
-            return _ranked(pycolmap.incremental_mapping(copy, folder, folder, options, next_image_callback=count))
+            models = pycolmap.incremental_mapping(copy, folder, folder, options, next_image_callback=count)
+            if not models:  # a pair alone, or photographs that are all close together
+                options.triangulation.ignore_two_view_tracks = False
+                options.mapper.init_min_tri_angle = _NARROW
+                options.mapper.init_min_num_inliers = 25
+                models = pycolmap.incremental_mapping(copy, folder, folder, options, next_image_callback=count)
+        return _joined(copy, models)
 
 
 def triangulate(database: Path, model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
@@ -116,16 +125,15 @@ def triangulate(database: Path, model: pycolmap.Reconstruction) -> pycolmap.Reco
         return pycolmap.triangulate_points(model, copy, folder, folder, clear_points=True, options=options)
 
 
-class quiet:  # noqa: N801 - used as a function
-    """Keep COLMAP's log to errors; some of its functions reset the level when they end."""
-
-    def __enter__(self) -> None:
-        """Lower the voice."""
-        pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
-
-    def __exit__(self, *_: object) -> None:
-        """Lower it again, for those who come after."""
-        pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep COLMAP's log to what ends it; what it calls errors is told here in one sentence."""
+    silent = pycolmap.logging.Level.FATAL.value
+    pycolmap.logging.minloglevel = silent
+    try:
+        yield
+    finally:
+        pycolmap.logging.minloglevel = silent  # some of its functions reset the level when they end
 
 
 def _thin(path: Path, network: Network, given: Mapping[int, Camera]) -> None:
@@ -165,7 +173,7 @@ def _incremental_options(network: Network, given: Mapping[int, Camera]) -> pycol
     options = pycolmap.IncrementalPipelineOptions()
     options.num_threads, options.random_seed, options.extract_colors = 1, SEED, False
     options.min_model_size = 2
-    options.max_model_overlap = 10**6  # a second model may take in all of the first, from a better beginning
+    options.max_model_overlap = 6  # what a second model has in common with the first serves to join them
     options.min_num_matches = 10
     options.ba_global_frames_ratio = options.ba_global_points_ratio = _GROWTH
     options.ba_global_max_refinements = 2
@@ -194,11 +202,13 @@ def _global_options(given: Mapping[int, Camera]) -> pycolmap.GlobalPipelineOptio
     return options
 
 
-def _ranked(models: Mapping[int, pycolmap.Reconstruction]) -> list[pycolmap.Reconstruction]:
+def _joined(database: Path, models: Mapping[int, pycolmap.Reconstruction]) -> list[pycolmap.Reconstruction]:
+    """Return the block that the models make together, then those that do not belong to it, the largest first."""
     ranked = sorted(models.values(), key=lambda m: (-m.num_reg_images(), -m.num_points3D()))
     if not ranked or ranked[0].num_reg_images() < 2:
         raise NotEnoughData(
             "No two photographs could be oriented to each other: look for weakly tied photographs in the report of "
             "strandline:tiepoints, and check that they were taken from different places."
         )
-    return ranked
+    block, rest, joined = join(ranked)
+    return [triangulate(database, block) if joined else block, *rest]
