@@ -171,7 +171,7 @@ def part(model, names, change=None):
 def test_models_that_share_a_photograph_are_joined(flight, mapped):
     database, whole = mapped
     names = [f"{i:02d}.jpg" for i in range(12)]
-    turned = pycolmap.Rotation3d(np.array([0.1, 0.2, 0.3, 0.9]))
+    turned = pycolmap.Rotation3d(np.array([1.0, 3.0, 3.0, 9.0]) / 10.0)  # a unit quaternion: 1 + 9 + 9 + 81 = 100
     change = pycolmap.Sim3d(2.5, turned, np.array([3.0, -2.0, 7.0]))
     block, rest, joined = join([part(whole, names[:8]), part(whole, names[6:11], change), part(whole, names[11:], change)])
     assert joined
