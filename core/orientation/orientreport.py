@@ -55,8 +55,8 @@ def write_report(survey: Survey, model: pycolmap.Reconstruction, outcome: Orient
     for names in outcome.others:
         report.warning(f"These photographs fit each other but not the block: {', '.join(names)}.")
     names = [model.images[i].name for i in outcome.image_ids]
-    if outcome.link:
-        report.warning(outcome.link)
+    for doubt in outcome.doubts:
+        report.warning(doubt)
     report.text(
         "The frame is free: its position, direction and scale mean nothing until the block is georeferenced. Residuals are in "
         f"pixels of the stored photographs; the final filter drops what is beyond {outcome.limit:.2f} pixels "
@@ -129,7 +129,7 @@ def _residuals(report: Report, model: pycolmap.Reconstruction, outcome: Orientat
     figure = new_figure(8.0, 8.0 * camera.height / camera.width + 0.6)
     axes = figure.add_subplot()
     arrows = axes.quiver(*field.T, angles="xy", color="#a03020", width=0.002)
-    axes.quiverkey(arrows, 0.9, 1.03, max(longest, 1e-3), f"{longest:.2g} px", labelpos="W")
+    axes.quiverkey(arrows, 0.85, 1.04, max(longest, 1e-3), f"{longest:.2g} px", labelpos="W")
     axes.set_xlim(0, camera.width)
     axes.set_ylim(camera.height, 0)
     axes.set_aspect("equal")
