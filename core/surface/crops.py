@@ -5,17 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from .bands import Band, Place
-from .pictures import COARSEST, Pictures, grey
+from .pictures import COARSEST, Pictures
 from .plan import Plan
 from .views import TileView
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
+_SMOOTH_FROM = 1.3  # pixels a cell: below, there is nothing to take away
+_SMOOTHING = 0.35  # pixels of standard deviation, per pixel a cell
 _BORDER = 8  # cells and pixels more on every side
 
 
@@ -34,19 +37,29 @@ class Crops:
 
 def reduction(view: TileView, cell: float) -> int:
     """Return the level of a photograph whose pixel in the tile's middle comes closest to the cell, rather finer."""
-    pixel = float(view.ground_pixel(np.zeros((1, 3)))[0])
-    return int(np.clip(np.floor(np.log2(max(cell / pixel, 1e-3)) + 0.4), 0, COARSEST))
+    return int(np.clip(np.floor(np.log2(max(cell / _pixel(view), 1e-3)) + 0.4), 0, COARSEST))
+
+
+def _pixel(view: TileView) -> float:
+    return float(view.ground_pixel(np.zeros((1, 3)))[0])
 
 
 def cut(plan: Plan, pictures: Pictures, views: list[TileView], band: Band, place: Place, cell: float, step: float) -> Crops:
-    """Return the windows that any hypothesis of a band falls on."""
+    """Return the windows that any hypothesis of a band falls on.
+
+    They are about twice as fine as the cells, and smoothed to the cells: interpolation between pixels as coarse as the cells
+    would change the texture with the pixels' phase, which differs from view to view and pulls heights of few views.
+    """
     windows, corners = [], []
     limits = band.limits(step)
     for view in views:
-        level = reduction(view, cell)
-        picture = pictures.get(plan.paths[view.index], level)
+        level = max(0, reduction(view, cell) - 1)
+        picture = pictures.grey(plan.paths[view.index], level)
         box = _pixel_box(view, place, cell, limits, band.first.shape)
         window, corner = _window(picture, 0.5**level, box)
+        coarseness = cell / (_pixel(view) * 2**level)
+        if coarseness > _SMOOTH_FROM:
+            window = cv2.GaussianBlur(window, (0, 0), _SMOOTHING * coarseness)
         windows.append(window)
         corners.append(corner)
     sizes = [w.size for w in windows]
@@ -81,4 +94,4 @@ def _window(picture: NDArray[Any], scale: float, box: Array) -> tuple[Floats, tu
     rows, columns = picture.shape[:2]
     left, top = int(np.clip(box[0] * scale, 0, columns - 2)), int(np.clip(box[1] * scale, 0, rows - 2))
     right, bottom = int(np.clip(box[2] * scale + 2, left + 2, columns)), int(np.clip(box[3] * scale + 2, top + 2, rows))
-    return grey(picture[top:bottom, left:right]), (scale, float(left), float(top))
+    return picture[top:bottom, left:right].astype(np.float32) / np.float32(3.0), (scale, float(left), float(top))

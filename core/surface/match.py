@@ -13,7 +13,7 @@ from .mosaic import Tile, save
 from .ortho import paint
 from .pictures import Pictures
 from .plan import Plan
-from .regularisation import regularise
+from .regularisation import refine, regularise
 from .reliability import believable, matching_sigma
 from .views import TileView, choose, tile_views
 
@@ -24,6 +24,7 @@ MOST_VIEWS = 8
 SMALL, LARGE = 2, 4  # half sizes of the two windows that an adaptive one is mixed of
 NOISE = 0.5  # variance in 8-bit grey levels under which texture counts as noise: a JPEG's rounding and its sensor's rest
 KNEE = 24.0  # times the noise: where the small and the large window count alike
+REFINE = 3  # half steps on either side of the regularised surface in which its last refinement searches
 P_SMALL, P_LARGE = 0.02, 1.0  # penalties at REGULARITY 1 for a change of one step, and for a jump
 
 _pictures = Pictures()  # one cache per process: tiles that follow each other share photographs
@@ -52,9 +53,9 @@ def match_tile(plan: Plan, tile: Tile) -> None:
     seen = np.ones((len(views), *base.shape), bool)
     if coarser:
         for n, view in enumerate(views):
-            seen[n] = unhidden_by(coarser, view, tile, place) & view.inside(place.west, place.north, cell, base)
+            seen[n] = unhidden_by(coarser, view, tile, place) & _framed(view, place, cell, band, level.step)
     costs = _costs(plan, views, seen, band, place, cell, level.step, small, large)
-    height, score, curvature, doubt = regularise(
+    height, doubt = regularise(
         costs,
         band.offset,
         band.first,
@@ -69,13 +70,21 @@ def match_tile(plan: Plan, tile: Tile) -> None:
     if level.number > 0:
         save(path, height=height)
         return
+    around = np.pad(height, large, mode="edge")
+    near = Band(large, around, np.full(base.shape, -REFINE, np.int32), np.full(base.shape, 2 * REFINE + 1, np.int32))
+    held = np.array([_framed(view, place, cell, near, 0.5 * level.step) for view in views], bool).reshape(seen.shape)
+    costs = _costs(plan, views, seen & held, near, place, cell, 0.5 * level.step, small, large)
+    correction, score, curvature = refine(costs.reshape(*base.shape, -1), 0.5 * level.step)
+    height = cv2.bilateralFilter(height + correction, 5, level.step, 1.5)
     calm = cv2.medianBlur(height, 5)  # what hides is not the noise of single cells
     framed = np.array([view.inside(place.west, place.north, cell, height) for view in views], bool).reshape(seen.shape)
     for n, view in enumerate(views):
         seen[n] &= framed[n] & unhidden(view, calm, cell, place, level.step)
     number = seen.sum(axis=0).astype(np.uint8)
     cells = (2 * large + 1) ** 2
-    sigma = matching_sigma(score, curvature, number, cells, level.step)
+    # A camera's noise is alike over about two pixels (its colours are interpolated): finer cells are not independent.
+    independent = cells * min(1.0, cell / (2.0 * plan.gsd)) ** 2
+    sigma = matching_sigma(score, curvature, number, independent, level.step)
     save(
         path,
         height=height,
@@ -86,6 +95,19 @@ def match_tile(plan: Plan, tile: Tile) -> None:
         good=believable(height, score, sigma, number, doubt, cells, level.step),
         colour=_colour(plan, tile, place, everyone, coarser, calm),
     )
+
+
+def _framed(view: TileView, place: Place, cell: float, band: Band, step: float) -> Mask:
+    """Tell at which cells a view shows the whole window at every hypothesis.
+
+    A view that left the frame between two hypotheses would change their scores by its absence alone, and pull the height there.
+    """
+    base = band.inner
+    low = (base + band.first * step).astype(np.float32)
+    high = (base + (band.first + band.count) * step).astype(np.float32)
+    whole = view.inside(place.west, place.north, cell, low) & view.inside(place.west, place.north, cell, high)
+    side = 2 * band.border + 1
+    return np.asarray(cv2.erode(whole.astype(np.uint8), np.ones((side, side), np.uint8)) > 0)
 
 
 def _costs(

@@ -100,7 +100,7 @@ def paint(
         weight[np.isnan(weight) | (weight < 1e-12)] = 0.0
         if not weight.any():
             continue
-        picture = pictures.get(path, level)
+        picture = pictures.colour(path, level)
         _add(
             picture, 0.5**level, view.matrix, view.brown, view.fold2, west, north, cell, height,
             weight.astype(np.float32), colour, total,

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 
-Floats = NDArray[np.float32]
-
 COARSEST = 6  # the strongest reduction: 1 / 2**6
 _DECODER = {0: cv2.IMREAD_COLOR, 1: cv2.IMREAD_REDUCED_COLOR_2, 2: cv2.IMREAD_REDUCED_COLOR_4, 3: cv2.IMREAD_REDUCED_COLOR_8}
 
@@ -21,20 +19,27 @@ _DECODER = {0: cv2.IMREAD_COLOR, 1: cv2.IMREAD_REDUCED_COLOR_2, 2: cv2.IMREAD_RE
 class Pictures:
     """Reads photographs at 1 / 2**level of their size and keeps the last read, up to ``limit`` bytes."""
 
-    def __init__(self, limit: int = 400_000_000) -> None:
-        self._limit, self._kept = limit, OrderedDict[tuple[str, int], NDArray[Any]]()
+    def __init__(self, limit: int = 500_000_000) -> None:
+        self._limit, self._kept = limit, OrderedDict[tuple[str, int, bool], NDArray[Any]]()
 
-    def get(self, path: str, level: int) -> NDArray[Any]:
+    def colour(self, path: str, level: int) -> NDArray[Any]:
         """Return a photograph (rows, columns, 3: red, green, blue), as stored, never rotated."""
-        key = (path, level)
+        return self._get(path, level, True)
+
+    def grey(self, path: str, level: int) -> NDArray[Any]:
+        """Return the ``channel_sum`` of a photograph (rows, columns)."""
+        return self._get(path, level, False)
+
+    def _get(self, path: str, level: int, colour: bool) -> NDArray[Any]:
+        key = (path, level, colour)
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key]
         picture = read_reduced(path, level)
-        self._kept[key] = picture
+        self._kept[key] = picture if colour else channel_sum(picture)
         while len(self._kept) > 1 and sum(p.nbytes for p in self._kept.values()) > self._limit:
             self._kept.popitem(last=False)
-        return picture
+        return self._kept[key]
 
 
 def read_reduced(path: str, level: int) -> NDArray[Any]:
@@ -62,7 +67,8 @@ def read_reduced(path: str, level: int) -> NDArray[Any]:
     return np.ascontiguousarray(picture[:, :, ::-1])
 
 
-def grey(picture: NDArray[Any]) -> Floats:
-    """Return the mean of the channels in 8-bit grey levels: no luma, whose rounding would cost sand half a bit."""
-    scale = 255.0 / np.iinfo(picture.dtype).max / 3.0
-    return (picture.sum(axis=2, dtype=np.float32) * np.float32(scale)).astype(np.float32)
+def channel_sum(picture: NDArray[Any]) -> NDArray[Any]:
+    """Return the sum of the channels in thirds of 8-bit grey levels: no luma, whose rounding would cost sand half a bit."""
+    if picture.dtype == np.uint8:
+        return picture.sum(axis=2, dtype=np.uint16)
+    return picture.sum(axis=2, dtype=np.float32) * np.float32(255.0 / np.iinfo(picture.dtype).max)

@@ -7,6 +7,7 @@ the base already has costs nothing; where the base itself jumps, they act on the
 
 from __future__ import annotations
 
+import cv2
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ Places = NDArray[np.int64]
 
 # A base that changes by more steps than this from cell to cell has a jump there, not a slope.
 _SLOPE = 1.5
+_SUMMED = 5  # cells per side over which the refinement sums costs
 DIRECTIONS = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
 
 
@@ -95,15 +97,14 @@ def aggregate(
 @nb.njit(cache=True, error_model="numpy")
 def decide(
     costs: Floats, total: Floats, offset: Places, first: Integers, count: Integers, base: Floats, step: float
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return height, score, curvature (1/m2) and doubt of the best hypothesis of each cell, all (rows, columns).
+) -> tuple[Floats, Floats]:
+    """Return height and doubt of the best hypothesis of each cell, both (rows, columns).
 
-    The height is refined by a parabola through the total costs; the score is that of the plain costs there, the curvature
-    that of the plain score; doubt is the distance (steps) between it and the best without regularisation.
+    The height is refined by a parabola through the total costs; doubt is how many steps the best hypothesis without
+    regularisation is away.
     """
     rows, columns = base.shape
-    height, score = np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32)
-    curvature, doubt = np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32)
+    height, doubt = np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32)
     for r in range(rows):
         for c in range(columns):
             o, n = offset[r, c], count[r, c]
@@ -115,27 +116,41 @@ def decide(
                     best = k
                 if costs[o + k] < costs[o + plain]:
                     plain = k
-            part, bend = 0.0, 0.0
-            value = costs[o + best]
+            part = 0.0
             if 0 < best < n - 1:
                 a, b, d = total[o + best - 1], total[o + best], total[o + best + 1]
                 if a + d - 2.0 * b > 0.0:
                     part = min(max(0.5 * (a - d) / (a + d - 2.0 * b), -0.5), 0.5)
-                a, b, d = costs[o + best - 1], costs[o + best], costs[o + best + 1]
-                bend = (a + d - 2.0 * b) / (step * step)
-                value = b + 0.5 * part * (d - a) + 0.5 * part * part * (a + d - 2.0 * b)
             height[r, c] = base[r, c] + (first[r, c] + best + part) * step
-            score[r, c] = 1.0 - value
-            curvature[r, c] = bend
             doubt[r, c] = abs(plain - best)
-    return height, score, curvature, doubt
+    return height, doubt
 
 
 def regularise(
     costs: Floats, offset: Places, first: Integers, count: Integers, base: Floats, *, step: float, small: float, large: float
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return what ``decide`` tells after summing the paths of all eight directions."""
+) -> tuple[Floats, Floats]:
+    """Return height and doubt, as ``decide`` tells them, after summing the paths of all eight directions."""
     total = np.zeros_like(costs)
     for down, right in DIRECTIONS:
         aggregate(costs, offset, first, count, base, step, down, right, small, large, total)
     return decide(costs, total, offset, first, count, base, step)
+
+
+def refine(costs: Floats, step: float) -> tuple[Floats, Floats, Floats]:
+    """Return correction (m), score and curvature (1/m2) of each cell from ``costs`` (rows, columns, hypotheses) about a surface.
+
+    Regularisation draws weak cells towards the base, by up to a step. This takes that back: the minimum of the plain costs,
+    summed over a few cells (which weighs each by its own sharpness), near the regularised surface. Hypotheses are ``step``
+    apart with the middle one on the surface; a cell whose minimum lies at the end of them, or has no curvature, is not corrected.
+    """
+    rows, columns, count = costs.shape
+    summed = np.stack([cv2.blur(np.ascontiguousarray(costs[:, :, k]), (_SUMMED, _SUMMED)) for k in range(count)])
+    best = summed.argmin(axis=0)
+    inner = best.clip(1, count - 2)[None]
+    a, b, d = (np.take_along_axis(summed, inner + k, axis=0)[0] for k in (-1, 0, 1))
+    bend = a + d - 2 * b
+    usable = (best > 0) & (best < count - 1) & (bend > 0)
+    part = np.where(usable, 0.5 * (a - d) / np.where(usable, bend, 1.0), 0.0)
+    height = np.where(usable, (best - count // 2 + part) * step, 0.0)
+    plain = np.take_along_axis(np.moveaxis(costs, 2, 0), np.where(usable, best, count // 2)[None], axis=0)[0]
+    return height.astype(np.float32), (1.0 - plain).astype(np.float32), (bend / step**2).astype(np.float32)

@@ -56,11 +56,10 @@ def _speckles(height: Floats, good: NDArray[np.bool_], step: float) -> NDArray[n
     return np.asarray(good & (lonely | (coded == -1000)))
 
 
-# A parabola through scores one step apart finds the best height to about this part of a step, however sharp the texture.
-_STEP_ERROR = 0.13
+_STEP_ERROR = 0.03  # steps by which a parabola misses the best height, however sharp the texture
 
 
-def matching_sigma(score: Floats, curvature: Floats, views: NDArray[np.uint8], cells: int, step: float) -> Floats:
+def matching_sigma(score: Floats, curvature: Floats, views: NDArray[np.uint8], cells: float, step: float) -> Floats:
     """Return the standard deviation of the height from the noise of matching (m); NaN where it cannot be told.
 
     For m views with independent noise, mean correlation rho over n cells and curvature kappa of the score along the

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from strandline.core.camera import Camera
 from strandline.core.surface.correlation import BLOCK, correlate, fill_costs
-from strandline.core.surface.regularisation import DIRECTIONS, aggregate, decide, regularise
+from strandline.core.surface.regularisation import DIRECTIONS, aggregate, decide, refine, regularise
 from strandline.core.surface.sampling import inside, project, sample, visible
 
 CAMERA = Camera("FULL_OPENCV", 64, 48, (70.0, 72.0, 31.0, 25.0, -0.05, 0.02, 1e-3, -2e-3, 0.01, 0.02, 0.01, 0.005))
@@ -217,17 +217,27 @@ def test_aggregate_equals_the_plain_recursion(down, right):
 
 
 def test_decide_finds_the_vertex_of_a_parabola():
-    # Costs 0.3 + 2 (z - 0.13)^2 at z = -0.2 .. 0.3: vertex 0.13, curvature of the score 4 per m2.
+    # Costs 0.3 + 2 (z - 0.13)^2 at z = -0.2 .. 0.3: vertex 0.13.
     z = np.arange(-2, 4) * 0.1
     costs = (0.3 + 2 * (z - 0.13) ** 2).astype(np.float32)
     one = np.ones((1, 1))
-    height, score, curvature, doubt = decide(
+    height, doubt = decide(
         costs, costs, np.zeros((1, 1), np.int64), np.full((1, 1), -2, np.int32), (6 * one).astype(np.int32), 5 * one, 0.1
     )
     assert height[0, 0] == pytest.approx(5.13, abs=1e-4)
-    assert score[0, 0] == pytest.approx(0.7, abs=1e-3)
-    assert curvature[0, 0] == pytest.approx(4.0, rel=1e-3)
     assert doubt[0, 0] == 0
+
+
+def test_refine_finds_the_vertex_its_score_and_its_curvature():
+    z = np.arange(-3, 4) * 0.05
+    costs = np.tile(0.3 + 2 * (z - 0.06) ** 2, (9, 9, 1)).astype(np.float32)
+    correction, score, curvature = refine(costs, 0.05)
+    np.testing.assert_allclose(correction, 0.06, atol=1e-4)
+    np.testing.assert_allclose(score, 0.7, atol=1e-3)  # at the hypothesis next to the vertex
+    np.testing.assert_allclose(curvature, 4.0, rtol=1e-3)
+    # A minimum at the end of the search corrects nothing.
+    correction, _, _ = refine(np.tile(np.linspace(1, 0, 7), (9, 9, 1)).astype(np.float32), 0.05)
+    assert (correction == 0).all()
 
 
 def test_decide_stays_on_the_base_when_nothing_speaks():
@@ -247,7 +257,7 @@ def test_regularisation_mends_a_single_wrong_cell_and_keeps_a_step():
     costs[7, 3] = 0.2
     costs[7, 3, 18] = 0.0
     shape = np.zeros((rows, columns), np.float32)
-    height, _, _, doubt = regularise(
+    height, doubt = regularise(
         costs.astype(np.float32).ravel(),
         np.arange(rows * columns, dtype=np.int64).reshape(rows, columns) * count,
         np.zeros((rows, columns), np.int32),
