@@ -55,8 +55,8 @@ def write_report(survey: Survey, model: pycolmap.Reconstruction, outcome: Orient
     for names in outcome.others:
         report.warning(f"These photographs fit each other but not the block: {', '.join(names)}.")
     names = [model.images[i].name for i in outcome.image_ids]
-    for doubt in outcome.doubts:
-        report.warning(doubt)
+    if outcome.link:
+        report.warning(outcome.link)
     report.text(
         "The frame is free: its position, direction and scale mean nothing until the block is georeferenced. Residuals are in "
         f"pixels of the stored photographs; the final filter drops what is beyond {outcome.limit:.2f} pixels "
