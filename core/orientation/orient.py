@@ -8,7 +8,7 @@ run that was interrupted is run again and gives the same to the bit.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -21,17 +21,18 @@ from ..errors import InputError, NotEnoughData
 from ..files import digest, whole
 from ..photographs.listing import some
 from ..progress import SILENT, Progress
-from ..survey import Survey, held
+from ..survey import Photograph, Survey, held
 from ..tiepoints.database import NAME
 from ..tiepoints.statistics import Statistics, micmac_statistics, weakest_link
 from . import selfcalibration as calibrating
 from .calibration import MODEL, read_calibration
-from .mapping import camera_from_colmap, map_photographs, read_network, triangulate
+from .focal import CALIBRATION_SIGMA, FILE_SIGMA, FocalPrior, far_off
+from .mapping import Network, camera_from_colmap, map_photographs, read_network, triangulate
 from .orientreport import Orientation, write_report
 from .pointcloud import write_points
 from .sparse import block_from_model
 
-VERSION = 1  # raise it when the same input would give another result
+VERSION = 2  # raise it when the same input would give another result
 _WEAK_LINK = 100  # points of three or more rays below which a link between two parts of the block is told of
 _MULTI = 10  # observations of points with three or more rays below which a photograph's pose is not believed
 
@@ -117,6 +118,7 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
     network = read_network(database)
     given = {network.camera_of[i]: known[name] for i, name in network.names.items() if name in known}
     fixed = set(given) if request.calibration_use == "fixed" else set()
+    priors = _focal_priors(survey.photographs, network, given)
     mapper: Literal["incremental", "global"] = "global" if request.mapper == "global" else "incremental"
     models = map_photographs(database, network, mapper=mapper, given=given, progress=progress.part(0.0, 0.5))
     model = models[0]
@@ -124,13 +126,13 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
         if camera_id not in fixed:
             wanted = calibrating.MODELS[request.camera_model]
             calibrating.set_camera(model, camera_id, calibrating.convert_camera(camera_from_colmap(camera), wanted))
-    calibrating.self_calibrate(model, request.camera_model, fixed, rounds=2, iterations=50)
+    calibrating.self_calibrate(model, request.camera_model, fixed, rounds=2, iterations=50, priors=priors)
     progress.at(0.55)
-    sigmas = calibrating.camera_sigmas(model, request.camera_model, fixed)
+    sigmas = calibrating.camera_sigmas(model, request.camera_model, fixed, priors)
     progress.at(0.6)
     model = triangulate(database, model)
     progress.at(0.7)
-    calibrating.self_calibrate(model, request.camera_model, fixed, rounds=1, iterations=20)
+    calibrating.self_calibrate(model, request.camera_model, fixed, rounds=1, iterations=20, priors=priors)
     progress.at(0.85)
     _drop_weak(model)
     entering = calibrating.observations(model)
@@ -139,7 +141,7 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
             f"No tie point of {survey.folder} survives the adjustment: look at the report of strandline:tiepoints."
         )
     sigma = calibrating.robust_sigma(entering.length)
-    calibrating.adjust(model, request.camera_model, fixed, robust=max(2 * sigma, 0.1), iterations=30)
+    calibrating.adjust(model, request.camera_model, fixed, robust=max(2 * sigma, 0.1), iterations=30, priors=priors)
     entering = calibrating.observations(model)
     limit = calibrating.FILTER * calibrating.robust_sigma(entering.length)
     calibrating.drop_observations(model, entering, limit)
@@ -154,6 +156,8 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
     with whole(survey.folder / MODEL) as part:
         part.mkdir()
         model.write(part)
+    for text in (doubt := far_off(model, priors, fixed)):
+        progress.warn(text)
     link = _weak_link(calibrating.observations(model), ids, names)
     if link:
         progress.warn(link)
@@ -164,7 +168,8 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
         limit=limit,
         missing=missing,
         others=_apart([{m.images[i].name for i in m.reg_image_ids()} for m in models[1:]], set(missing)),
-        link=link,
+        doubts=[*doubt, *([link] if link else [])],
+        priors=priors,
         sigmas=sigmas,
         fixed=fixed,
     )
@@ -188,6 +193,17 @@ def _apart(others: list[set[str]], missing: set[str]) -> list[list[str]]:
         if len(left) > 1:
             result.append(sorted(left))
     return result
+
+
+def _focal_priors(photographs: Sequence[Photograph], network: Network, given: Mapping[int, Camera]) -> dict[int, FocalPrior]:
+    """Return what is known of focal lengths, by camera id: from another survey, else from the files."""
+    told = {p.name: p.focal for p in photographs if p.focal}
+    priors = {network.camera_of[i]: told[name] for i, name in network.names.items() if name in told}
+    known = {camera_id: FocalPrior(focal, FILE_SIGMA * focal) for camera_id, focal in priors.items()}
+    for camera_id, camera in given.items():
+        focal = float(camera.brown()[:2].mean())
+        known[camera_id] = FocalPrior(focal, CALIBRATION_SIGMA * focal)
+    return known
 
 
 def _drop_weak(model: pycolmap.Reconstruction) -> None:

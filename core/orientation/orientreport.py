@@ -13,6 +13,7 @@ from ..camera import PARAMETERS
 from ..report.html import Report, new_figure
 from ..survey import Survey
 from ..tiepoints.statistics import Statistics, coverage_percent
+from .focal import FocalPrior
 from .selfcalibration import FILTER, Observations
 from .sparse import block_from_model
 
@@ -26,8 +27,8 @@ class Orientation:
     """What the report tells beside the model.
 
     ``statistics`` and ``image_ids`` are in the order of the photographs' names; ``limit`` (px) is the final filter's; ``missing``
-    are the photographs that are not oriented, ``others`` the smaller models; ``link`` is a sentence
-    on the block's weakest link, or empty; ``sigmas`` of camera parameters are by camera id.
+    are the photographs that are not oriented, ``others`` the smaller models; ``doubts`` are sentences on the block's weakest
+    link and on focal lengths; ``sigmas`` of camera parameters and ``priors`` of focal lengths are by camera id.
     """
 
     statistics: Statistics
@@ -36,9 +37,10 @@ class Orientation:
     limit: float
     missing: Sequence[str]
     others: Sequence[Sequence[str]]
-    link: str
+    doubts: Sequence[str]
     sigmas: Mapping[int, Array]
     fixed: Collection[int]
+    priors: Mapping[int, FocalPrior]
 
 
 def write_report(survey: Survey, model: pycolmap.Reconstruction, outcome: Orientation, copy: str | None) -> None:
@@ -55,8 +57,8 @@ def write_report(survey: Survey, model: pycolmap.Reconstruction, outcome: Orient
     for names in outcome.others:
         report.warning(f"These photographs fit each other but not the block: {', '.join(names)}.")
     names = [model.images[i].name for i in outcome.image_ids]
-    if outcome.link:
-        report.warning(outcome.link)
+    for doubt in outcome.doubts:
+        report.warning(doubt)
     report.text(
         "The frame is free: its position, direction and scale mean nothing until the block is georeferenced. Residuals are in "
         f"pixels of the stored photographs; the final filter drops what is beyond {outcome.limit:.2f} pixels "
@@ -90,6 +92,9 @@ def _cameras(report: Report, model: pycolmap.Reconstruction, outcome: Orientatio
         count = sum(model.images[i].camera_id == camera_id for i in outcome.image_ids)
         state = "held at the given calibration" if camera_id in outcome.fixed else "adjusted"
         report.text(f"Camera {camera_id} ({camera.width} x {camera.height}, {count} photographs), {camera.model.name}, {state}.")
+        if camera_id in outcome.priors and camera_id not in outcome.fixed:
+            prior = outcome.priors[camera_id]
+            report.text(f"Its focal length entered the adjustment as {prior.value:.1f} px with a sigma of {prior.sigma:.1f} px.")
         sigmas = outcome.sigmas.get(camera_id)
         names = PARAMETERS[camera.model.name]
         report.table(

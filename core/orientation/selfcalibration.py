@@ -6,8 +6,9 @@ middle: in fewer, and in one strip, it cannot be told from a tilt.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import cv2  # noqa: F401 - before pycolmap, whose PNG library otherwise crashes OpenCV's
@@ -16,6 +17,7 @@ import pycolmap
 from numpy.typing import NDArray
 
 from ..camera import PARAMETERS, Camera
+from .focal import FocalPrior, add_priors
 from .mapping import camera_from_colmap, quiet
 
 Array = NDArray[np.float64]
@@ -26,6 +28,7 @@ FILTER = 6.0  # robust sigmas of a 2D residual beyond which an observation is dr
 _COARSE_FILTER = 8.0
 _RAYLEIGH = 1.17741  # the median of a 2D residual in units of its sigma per axis
 _ANGLE = 1.5  # degrees, the least at which two rays of a point meet
+NO_PRIORS: Mapping[int, FocalPrior] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -95,14 +98,17 @@ def adjust(
     *,
     robust: float,
     iterations: int,
+    priors: Mapping[int, FocalPrior] = NO_PRIORS,
 ) -> None:
     """Adjust all of ``model`` in place; cameras whose id is in ``fixed`` keep their parameters.
 
-    ``robust`` is the length of a residual (px) beyond which it weighs less (soft L1).
+    ``robust`` is the length of a residual (px) beyond which it weighs less (soft L1); ``priors`` are by camera id.
     """
     adjuster = make_adjuster(model, camera_model, fixed, robust=robust, iterations=iterations)
     with quiet():
+        alive = add_priors(adjuster, model, priors, fixed, sigma=robust_sigma(observations(model).length))
         adjuster.solve()
+        del alive
     model.update_point_3d_errors()
 
 
@@ -157,17 +163,21 @@ def self_calibrate(
     *,
     rounds: int,
     iterations: int,
+    priors: Mapping[int, FocalPrior] = NO_PRIORS,
 ) -> None:
     """Adjust ``model`` in place and drop what is far off, ``rounds`` times."""
     for _ in range(rounds):
         sigma = robust_sigma(observations(model).length)
-        adjust(model, camera_model, fixed, robust=max(2 * sigma, 0.1), iterations=iterations)
+        adjust(model, camera_model, fixed, robust=max(2 * sigma, 0.1), iterations=iterations, priors=priors)
         found = observations(model)
         drop_observations(model, found, _COARSE_FILTER * robust_sigma(found.length))
 
 
 def camera_sigmas(
-    model: pycolmap.Reconstruction, camera_model: Literal["brown", "radial", "simple_radial", "full"], fixed: Collection[int]
+    model: pycolmap.Reconstruction,
+    camera_model: Literal["brown", "radial", "simple_radial", "full"],
+    fixed: Collection[int],
+    priors: Mapping[int, FocalPrior] = NO_PRIORS,
 ) -> dict[int, Array]:
     """Return the sigma of each parameter of each adjusted camera of an adjusted model, by camera id; 0 where it was held.
 
@@ -176,10 +186,12 @@ def camera_sigmas(
     sigma = robust_sigma(observations(model).length)
     adjuster = make_adjuster(model, camera_model, fixed, robust=1e6, iterations=1)
     with quiet():
+        alive = add_priors(adjuster, model, priors, fixed, sigma=sigma)
         adjuster.solve()
         options = pycolmap.BACovarianceOptions()
         options.params = pycolmap.BACovarianceOptionsParams.ALL
         covariance = pycolmap.estimate_ba_covariance(options, model, adjuster)
+        del alive
     if covariance is None:  # the block is too weak to tell
         return {}
     held: dict[int, list[int]] = {camera_id: [] for camera_id in model.cameras}

@@ -6,6 +6,7 @@ import numpy as np
 import pycolmap
 import pytest
 from strandline.core.camera import Camera
+from strandline.core.orientation.focal import FocalPrior, far_off
 from strandline.core.orientation.mapping import map_photographs, read_network, triangulate
 from strandline.core.orientation.merging import join
 from strandline.core.orientation.orientreport import residual_field
@@ -155,6 +156,27 @@ def test_the_sigmas_of_the_camera_cover_its_errors(mapped):
     assert np.all(sigmas[1] > 0)
     assert np.all(np.abs(error) < 4.5 * sigmas[1])  # eight parameters, correlated; 4.5 sigma is one in 10^5 for each
     assert camera_sigmas(model, "brown", (1,)) == {}
+
+
+def test_a_focal_length_known_beforehand_weighs_as_much_as_the_independent_part_of_the_tie_points(mapped):
+    _, first = mapped
+    free = start(first)
+    self_calibrate(free, "radial", (), rounds=2, iterations=50)
+    adjust(free, "radial", (), robust=1e6, iterations=50)
+    found, alone = observations(free), free.cameras[1].params[0]
+    overstated = len(found.image) / free.num_reg_images() / 100
+    assert overstated > 1
+    sigma = camera_sigmas(free, "radial", ())[1][0] * np.sqrt(overstated)
+    held = pycolmap.Reconstruction(free)
+    prior = {1: FocalPrior(alone + 2 * sigma, sigma)}  # as certain as the tie points are: the result lies half way
+    adjust(held, "radial", (), robust=1e6, iterations=50, priors=prior)
+    assert held.cameras[1].params[0] == pytest.approx(alone + sigma, abs=0.15 * sigma)
+    assert far_off(held, prior, ()) == []
+    [sentence] = far_off(held, {1: FocalPrior(1.1 * alone, 0.01 * alone)}, ())
+    assert "check that the photographs are not cropped" in sentence
+    # A camera that is held takes no prior.
+    adjust(free, "radial", {1}, robust=1e6, iterations=5, priors=prior)
+    assert free.cameras[1].params[0] == alone
 
 
 def part(model, names, change=None):
