@@ -16,7 +16,11 @@ _CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Doming:
-    """The rise of a radially quadratic error from the centre to the outermost point, and its sigma (m)."""
+    """The rise (m) of a radially quadratic height error from the points' middle to the outermost of them, and its sigma.
+
+    Positive where the block lies too high at its edges. ``significant`` tells whether it is beyond chance and large enough to
+    matter; the number alone is not.
+    """
 
     amplitude: float
     sigma: float
@@ -35,11 +39,26 @@ def alti(errors: Array) -> float | None:
     return float(np.sqrt(np.mean(errors[:, 2] ** 2))) if len(errors) else None
 
 
-def doming(places: Array, heights: Array, limit: float) -> Doming | None:
-    """Fit ``dU = a0 + a1 E + a2 N + a3 r^2`` to height errors (n,) at places (n, 2); r counts from their mean.
+def doming(places: Array, heights: Array, sigmas: Array | None, limit: float) -> Doming | None:
+    """Fit ``dU = a0 + a1 E + a2 N + a3 r^2`` to height errors (n,) at places (n, 2); r counts from the places' mean.
 
-    It is significant when ``|a3|`` exceeds Student's quantile at 95 % with n - 4 degrees of freedom AND its amplitude exceeds
-    ``limit`` (m): the test alone alarms on millimetres. None with fewer than eight points, or when they do not determine it.
+    Parameters
+    ----------
+    places, heights
+        Where the errors were found, and the errors, computed minus given (m). They may be residuals of a georeferencing: its
+        shift and tilt are a0 to a2, which are free here, so that they leave a3 and its sigma as they are.
+    sigmas
+        Of each error of its own (n,): surveying and marks, without what the georeferencing adds. Errors of their own are
+        independent of each other, while leave-one-out errors are not. None when they are alike and not known.
+    limit
+        The amplitude (m) below which a dome does not matter.
+
+    Returns
+    -------
+    None with fewer than eight points, or when they do not determine it. The amplitude is ``a3 r_max^2``, with weights
+    1 / sigma^2. It is significant when it exceeds ``limit`` AND its sigma times Student's quantile at 95 % with n - 4 degrees of
+    freedom. Known sigmas are enlarged by what the residuals say, never made smaller: they may be far too small, but eight points
+    that happen to fit well say little.
     """
     places, heights = np.asarray(places, float).reshape(-1, 2), np.asarray(heights, float)
     if len(places) < DOMING_POINTS:
@@ -49,13 +68,15 @@ def doming(places: Array, heights: Array, limit: float) -> Doming | None:
     reach = float(r2.max())
     if reach == 0.0:
         return None
-    scale = np.sqrt(reach)
-    design = np.column_stack([np.ones(len(d)), d / scale, r2 / reach])
+    design = np.column_stack([np.ones(len(d)), d / np.sqrt(reach), r2 / reach])
+    # Judged without the weights: a point of next to no weight must not make the rest look like a shape.
     if np.linalg.matrix_rank(design, tol=1e-6 * np.sqrt(len(d))) < 4:
         return None
-    solved, *_ = np.linalg.lstsq(design, heights, rcond=None)
-    left, free = heights - design @ solved, len(d) - 4
-    covariance = np.linalg.inv(design.T @ design) * float(left @ left) / free
-    amplitude, sigma = float(solved[3]), float(np.sqrt(covariance[3, 3]))
-    bound = float(stats.t.ppf(0.5 + _CONFIDENCE / 2, free))
-    return Doming(amplitude, sigma, abs(amplitude) > bound * sigma and abs(amplitude) > limit)
+    own = np.ones(len(d)) if sigmas is None else np.asarray(sigmas, float)
+    weighted, right = design / own[:, None], heights / own
+    solved, *_ = np.linalg.lstsq(weighted, right, rcond=None)
+    left, free = right - weighted @ solved, len(d) - 4
+    factor = max(float(left @ left) / free, 0.0 if sigmas is None else 1.0)
+    amplitude, sigma = float(solved[3]), float(np.sqrt(factor * np.linalg.inv(weighted.T @ weighted)[3, 3]))
+    bound = float(stats.t.ppf(0.5 + _CONFIDENCE / 2, free)) * sigma
+    return Doming(amplitude, sigma, abs(amplitude) > max(bound, limit))

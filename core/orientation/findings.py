@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from .georeference import Result
     from .inputs import Inputs
 
-_EDGE_WARNING = 3.0  # times the sigma in the middle of the block
+_EDGE_WARNING = 3.0  # times the sigma amid the control; beyond it lies what control at the edges would mend
+_EDGE_MATTERS = 2.0  # ground pixels: about what a single height from five photographs is uncertain by
+_WELL_SEEN = 3  # rays of a tie point
+_SAMPLE = 5000  # tie points, enough for a percentile
 _NARROW = np.radians(2.0)
 _LEVELS_DIFFER = 5.0  # m; geoids lie tens of metres from the ellipsoid
 
@@ -67,10 +70,11 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
             told.append(f"The rays to {name} meet at {degrees:.1f} degrees only, which leaves its height uncertain.")
     told += _factor_sentences(solution)
     middle, edge = predicted(solution, block)
-    if max(edge[0] / middle[0], edge[1] / middle[1]) > _EDGE_WARNING:
+    matters = _EDGE_MATTERS * ground_pixel(block, solution.fit.similarity.scale)
+    if any(e > max(_EDGE_WARNING * m, matters) for m, e in zip(middle, edge, strict=True)):
         told.append(
-            f"The georeferencing is weak away from its points: sigma at the edge of the block is {_pair(*edge)}, in its "
-            f"middle {_pair(*middle)}; put control near the edges."
+            "The georeferencing is weak away from its points: sigma at the edge of the ground that "
+            f"{_WELL_SEEN} photographs see is {_pair(*edge)}, amid the points {_pair(*middle)}; put control near the edges."
         )
     if solution.height_doubt > 0 and abs(inputs.focal_change) > FOCAL_ASTRAY:
         told.append(
@@ -102,15 +106,19 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
 
 
 def predicted(solution: Solution, block: Block) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the georeferencing's predicted sigmas (plan, height; m) in the middle and at the worst corner of the block."""
-    ground = solution.fit.similarity.apply(block.points)
-    low, high = np.percentile(ground, [2, 98], axis=0)
-    middle = np.median(ground, axis=0)
-    corners = np.array([[x, y, middle[2]] for x in (low[0], high[0]) for y in (low[1], high[1])])
-    covariance = solution.fit.uncertainty(np.concatenate([middle[None], corners]))
+    """Return the georeferencing's predicted sigmas (plan, height; m) amid its control, and at the edge of the well-seen ground.
+
+    The ground ends where the tie points of three photographs or more end: a footprint reaches far beyond, where nothing is
+    measured. The edge stands for the two per cent of them that are known worst.
+    """
+    well = block.points[block.rays >= _WELL_SEEN] if np.any(block.rays >= _WELL_SEEN) else block.points
+    ground = solution.fit.similarity.apply(well[:: max(1, len(well) // _SAMPLE)])
+    middle = np.array([*solution.fit.pivot[:2], np.median(ground[:, 2])])
+    covariance = solution.fit.uncertainty(np.concatenate([middle[None], ground]))
     plan = np.sqrt(covariance[:, 0, 0] + covariance[:, 1, 1])
     height = np.sqrt(covariance[:, 2, 2])
-    return (float(plan[0]), float(height[0])), (float(plan[1:].max()), float(height[1:].max()))
+    edge = float(np.percentile(plan[1:], 98)), float(np.percentile(height[1:], 98))
+    return (float(plan[0]), float(height[0])), edge
 
 
 def ground_pixel(block: Block, scale: float) -> float:

@@ -71,7 +71,11 @@ class Request:
 
 @dataclass(frozen=True)
 class Result:
-    """Counts, and root mean square errors (m) in plan and height; None where nothing determines them."""
+    """Counts, and root mean square errors (m) in plan and height; None where nothing determines them.
+
+    ``doming`` (m) is how much a radially quadratic height error rises from the points' middle to the outermost of them, from the
+    height errors of eight control and check points or more, else from those of GNSS; it is a dome only where the report says so.
+    """
 
     output: str
     control_count: int
@@ -201,7 +205,7 @@ def _result(request: Request, solution: Solution, inputs: Inputs, block: Block) 
     control, checks = solution.errors[found & ~check], solution.errors[found & check]
     loo = solution.loo[np.isfinite(solution.loo[:, 0])]
     gnss_alti = alti(solution.gnss_errors) if inputs.heights.comparable else None
-    dome = _doming(solution, inputs, found & check, block)
+    dome = _doming(solution, inputs, block)
     result = Result(
         request.survey,
         len(control),
@@ -219,15 +223,19 @@ def _result(request: Request, solution: Solution, inputs: Inputs, block: Block) 
     return result, dome
 
 
-def _doming(solution: Solution, inputs: Inputs, checks: NDArray[np.bool_], block: Block) -> Doming | None:
-    """Test for a dome on check and leave-one-out errors, or with too few of them on GNSS heights."""
+def _doming(solution: Solution, inputs: Inputs, block: Block) -> Doming | None:
+    """Test for a dome on the errors of control and check points, or with too few of them on GNSS heights.
+
+    The worst blunder in height is left out: one in the middle looks like a dome. Others stay, for a dome makes blunders of many.
+    """
     limit = ground_pixel(block, solution.fit.similarity.scale)
-    left = np.isfinite(solution.loo[:, 0])
+    worst = max((b for b in solution.blunders if b.part == "height"), key=lambda b: b.ratio, default=None)
+    used = np.array([s.found is not None and (worst is None or s.point.name != worst.name) for s in solution.seen], bool)
     places = np.array([s.point.coordinates for s in solution.seen], float).reshape(-1, 3)[:, :2]
-    errors = np.where(left, solution.loo[:, 2], solution.errors[:, 2])
-    dome = doming(places[left | checks], errors[left | checks], limit)
+    dome = doming(places[used], solution.errors[used, 2], solution.sigmas[used, 2], limit)
     if dome is None and len(inputs.gnss):
-        dome = doming(inputs.gnss.coordinates[:, :2], solution.gnss_errors[:, 2], limit)
+        sigmas = inputs.gnss.sigmas[:, 1] if inputs.gnss.declared else None
+        dome = doming(inputs.gnss.coordinates[:, :2], solution.gnss_errors[:, 2], sigmas, limit)
     return dome
 
 

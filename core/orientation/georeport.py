@@ -45,8 +45,8 @@ def report(solution: Solution, inputs: Inputs, result: Result, block: Block, dom
             ["control points, each left out", _count(solution.loo), result.plani_loo, result.alti_loo],
             ["  as predicted for these", _count(solution.loo), *_rms_sigma(solution.loo_sigma)],
             ["GNSS positions", len(solution.gnss_errors), result.plani_gnss, result.alti_gnss],
-            ["predicted sigma, middle of the block", None, *middle],
-            ["predicted sigma, edge of the block", None, *edge],
+            ["predicted sigma, amid the control", None, *middle],
+            ["predicted sigma, edge of the ground that three photographs see", None, *edge],
         ],
     )
     page.text(
@@ -55,7 +55,11 @@ def report(solution: Solution, inputs: Inputs, result: Result, block: Block, dom
     )
     page.text(_basis(solution, inputs))
     if dome is not None:
-        page.text(f"Doming: {dome.amplitude:+.3g} m from the middle to the outermost point, sigma {dome.sigma:.2g} m.")
+        judged = "beyond chance and a ground pixel" if dome.significant else "no more than chance, or less than a ground pixel"
+        page.text(
+            f"Doming: {dome.amplitude:+.3g} m with a sigma of {dome.sigma:.2g} m, {judged}. It is how much a radially quadratic "
+            "height error rises from the middle of the points to the outermost of them; shift and tilt are taken out."
+        )
     if solution.seen or len(inputs.gnss):
         page.heading("Residuals")
         page.figure(_map(solution, inputs, block), _CAPTION)

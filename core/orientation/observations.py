@@ -114,9 +114,13 @@ class Solver:
 
     def predicted(self, solved: Fit, index: int) -> Array:
         """Return the predicted covariance (3, 3) of the error of a point that took no part in ``solved``."""
-        turn = solved.similarity.scale * solved.similarity.rotation
-        own = self.covariance[index] + turn @ self.model_covariance[index] @ turn.T
+        own = self.own_covariance(solved)[index]
         return np.asarray(solved.factor * own + solved.uncertainty(self.ground[index : index + 1])[0])
+
+    def own_covariance(self, solved: Fit) -> Array:
+        """Return what surveying and marks alone say of the points' errors (n, 3, 3)."""
+        turn = solved.similarity.scale * solved.similarity.rotation
+        return np.asarray(self.covariance + turn @ self.model_covariance @ turn.T)
 
 
 def undetermined(solved: Fit, what: str) -> str:

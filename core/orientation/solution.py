@@ -25,9 +25,9 @@ class Solution:
     """The solved georeferencing.
 
     ``based_on`` is "control", "control and GNSS" or "GNSS". Arrays follow ``seen`` (n) and the GNSS positions (g); errors are
-    computed minus given in easting, northing, height of the CRS, NaN where there is none. ``loo`` are leave-one-out errors of the
-    control points, ``loo_sigma`` their predicted sigmas. ``height_doubt`` (m) is what the focal length adds to the heights' sigma
-    when no control point holds them.
+    computed minus given in easting, northing, height of the CRS, NaN where there is none, ``sigmas`` (n, 3) those that
+    surveying and marks give them. ``loo`` are leave-one-out errors of the control points, ``loo_sigma`` their predicted sigmas.
+    ``height_doubt`` (m) is what the focal length adds to the heights' sigma when no control point holds them.
     """
 
     frame: LocalFrame
@@ -35,6 +35,7 @@ class Solution:
     based_on: str
     seen: tuple[Seen, ...]
     errors: Array
+    sigmas: Array
     loo: Array
     loo_sigma: Array
     blunders: tuple[Blunder, ...]
@@ -78,6 +79,7 @@ def solve(
         )
     with_gnss, solved = _choose(solver, used)
     solver.with_gnss = with_gnss
+    sigmas = np.sqrt(np.diagonal(solver.own_covariance(solved), axis1=1, axis2=2))
     blunders = wrong_control(solver, used, solved)
     if blunders and used.sum() > TOO_FEW_TO_TELL:
         distrust(solver, blunders)
@@ -94,7 +96,20 @@ def solve(
         covariance = solved.covariance.copy()
         covariance[2, 2] += doubt**2
         solved = replace(solved, covariance=covariance)
-    return Solution(frame, solved, based, seen, errors, loo, loo_sigma, tuple(blunders), gnss_errors, tuple(suspicious), doubt)
+    return Solution(
+        frame,
+        solved,
+        based,
+        seen,
+        errors,
+        sigmas,
+        loo,
+        loo_sigma,
+        tuple(blunders),
+        gnss_errors,
+        tuple(suspicious),
+        doubt,
+    )
 
 
 def _choose(solver: Solver, used: NDArray[np.bool_]) -> tuple[bool, Fit]:

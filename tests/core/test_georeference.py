@@ -16,7 +16,6 @@ from strandline.core.contract import VectorSource
 from strandline.core.errors import InputError, NotEnoughData
 from strandline.core.frames import LocalFrame, transformer
 from strandline.core.georef import FOLDER, Georef
-from strandline.core.orientation.accuracy import alti, doming, plani
 from strandline.core.orientation.georeference import Request, run
 from strandline.core.orientation.heights import plan_heights, undulation
 from strandline.core.orientation.similarity import Similarity
@@ -208,32 +207,6 @@ def test_two_contradicting_marks_lose_weight_instead():
 def test_parallel_rays_do_not_meet():
     view = flight()[0]
     assert triangulate([view, view], np.array([[2000.0, 1500.0], [2000.0, 1500.0]]), 0.5) is None
-
-
-# Accuracy
-
-
-def test_root_mean_squares_by_hand():
-    errors = np.array([[3.0, 4.0, 1.0], [0.0, 0.0, -7.0]])
-    assert plani(errors) == pytest.approx(np.sqrt(12.5))
-    assert alti(errors) == pytest.approx(5.0)
-    assert plani(np.zeros((0, 3))) is None
-
-
-def test_doming_by_hand():
-    places = np.array([[0, 0], [10, 0], [-10, 0], [0, 10], [0, -10], [5, 5], [-5, -5], [5, -5], [-5, 5]], float)
-    dome = doming(places, 0.3 + 0.01 * places[:, 0] + 0.002 * np.sum(places**2, axis=1), 0.01)
-    assert dome.amplitude == pytest.approx(0.2)
-    assert dome.significant
-    assert not doming(places, 1e-6 * np.sum(places**2, axis=1), 0.01).significant  # below a pixel on the ground
-    assert doming(places[:7], np.zeros(7), 0.01) is None
-
-
-def test_doming_alarms_in_five_per_cent_of_clean_cases():
-    rng = np.random.default_rng(1)
-    places = rng.uniform(-50, 50, (9, 2))
-    alarms = sum(doming(places, rng.normal(size=9) * 0.02, 0.0).significant for _ in range(600))
-    assert alarms / 600 == pytest.approx(0.05, abs=0.027)  # three times the binomial scatter
 
 
 # Heights
@@ -659,3 +632,61 @@ def test_report_is_one_page_with_its_map(tmp_path):
     assert "data:image/png" in scene.report()
     assert "http" not in scene.report().replace("http-equiv", "")
     assert json.loads((tmp_path / "survey" / "georef.json").read_text())["method"] == "similarity"
+
+
+# What the analyst is told
+
+
+def bent(scene, rise, count=12):
+    """Give the scene ``count`` points on rings, whose surveyed heights see the block rise by ``rise`` at the outermost."""
+    angle = np.arange(count) * 2.4
+    reach = np.sqrt((np.arange(count) + 0.5) / (count - 0.5))
+    places = np.stack([19 * reach * np.cos(angle), 22 * reach * np.sin(angle), np.sin(3 * angle)], axis=1)
+    lower = np.outer(rise * reach**2, [0, 0, 1])
+    scene.gcps = {f"P{n}": p for n, p in enumerate(FRAME.to_crs(places) - lower)}
+    rng = np.random.default_rng(7)
+    scene.marks = []
+    for n, place in enumerate(places):
+        for view in scene.views:
+            pixels = view.project(place[None])[0]
+            if within(pixels):
+                scene.marks.append([f"P{n}", view.name, *(pixels + rng.normal(size=2) * 0.3)])
+    scene.survey_gcps(0.01, 0.02)
+
+
+def test_a_dome_is_told_with_its_size(tmp_path):
+    scene = Scene(tmp_path)
+    bent(scene, 0.3)
+    result = run(scene.request(check="P3, P7"))
+    # Its sigma is 3 cm: rings of twelve points, of 2 cm and marks of 0.5 px.
+    assert result.doming == pytest.approx(0.3, abs=0.09)
+    assert "Height errors form a dome of +0.3" in scene.report() or "Height errors form a dome of +0.2" in scene.report()
+    assert "beyond chance" in scene.report()
+
+
+def test_without_a_dome_the_number_stands_and_nobody_is_warned(tmp_path):
+    scene = Scene(tmp_path)
+    bent(scene, 0.0)
+    result = run(scene.request(check="P3, P7"))
+    assert result.doming is not None
+    assert abs(result.doming) < 0.09
+    assert "form a dome" not in scene.report()
+    assert "no more than chance" in scene.report()
+
+
+def test_control_in_the_corners_of_the_beach_is_near_enough_to_the_edges(tmp_path):
+    """Tie points reach 10 m beyond the control; there the georeferencing is still known to a pixel or two."""
+    scene = Scene(tmp_path)
+    scene.survey_gcps(0.005, 0.005)
+    run(scene.request(sigma_h=0.005, sigma_v=0.005, sigma_mark=0.2))
+    assert "weak away from its points" not in scene.report()
+
+
+def test_control_in_one_corner_is_told(tmp_path):
+    scene = Scene(tmp_path)
+    corner = {"a": (-18, -22, 0), "b": (-12, -22, 0), "c": (-18, -15, 0), "d": (-12, -15, 0.5)}
+    scene.gcps = {n: FRAME.to_crs(np.array([p], float))[0] for n, p in corner.items()}
+    scene.marks = [[n, v.name, *v.project(np.array([p], float))[0]] for n, p in corner.items() for v in scene.views]
+    scene.marks = [m for m in scene.marks if within(np.array(m[2:]))]
+    run(scene.request())
+    assert "weak away from its points: sigma at the edge of the ground that 3 photographs see" in scene.report()
