@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +17,7 @@ from .contract import encode
 
 PART = ".part-"  # marks what is not finished; whoever holds the survey may remove it
 _OLD = f"{PART}old-"  # marks a folder that is being replaced
+_SIDECAR = re.compile(r"(\.[\w.]+\.tmp|-journal|-wal|-shm)?")  # what libraries put beside the file they are writing
 
 
 @contextmanager
@@ -25,12 +28,12 @@ def whole(path: Path | str) -> Iterator[Path]:
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    part = target.with_name(f"{PART}{os.getpid()}-{target.name}")
+    part = target.with_name(f"{PART}{_writer()}-{target.name}")
     remove(part)
     try:
         yield part
         if part.is_dir() and target.is_dir():
-            old = target.with_name(f"{_OLD}{os.getpid()}-{target.name}")
+            old = target.with_name(f"{_OLD}{_writer()}-{target.name}")
             target.rename(old)
             part.rename(target)
             remove(old)
@@ -67,6 +70,21 @@ def remove_parts(folder: Path) -> None:
             remove(path)
 
 
+def remove_abandoned(path: Path | str) -> None:
+    """Remove what killed runs left of ``path`` beside it, where it lies among files that are not ours.
+
+    Only parts of this very target go, and only those whose process was one of this machine and lives no more.
+    """
+    target = Path(path)
+    if not target.parent.is_dir():
+        return
+    for entry in list(os.scandir(target.parent)):
+        writer, _, name = entry.name.removeprefix(PART).partition("-")
+        ours = entry.name.startswith(PART) and name.startswith(target.name) and _SIDECAR.fullmatch(name[len(target.name) :])
+        if ours and _is_gone(writer):
+            remove(Path(entry.path))
+
+
 def digest(*values: Any) -> str:
     """Return a fingerprint (32 hex digits) of JSON data."""
     text = json.dumps(encode(values), sort_keys=True, separators=(",", ":"), allow_nan=False)
@@ -82,6 +100,30 @@ def file_digest(path: Path | str) -> str:
 def bytes_digest(data: bytes) -> str:
     """Return the fingerprint that ``file_digest`` has of a file with this content."""
     return hashlib.blake2b(data, digest_size=16).hexdigest()
+
+
+def _machine() -> str:
+    """Return six hex digits for what process ids mean something in: this machine, and in it this container."""
+    namespace = Path("/proc/self/ns/pid")
+    return digest(socket.gethostname(), str(namespace.readlink()) if namespace.is_symlink() else "")[:6]
+
+
+def _writer() -> str:
+    return f"{os.getpid()}@{_machine()}"
+
+
+def _is_gone(writer: str) -> bool:
+    """Tell whether the process that wrote a part is known to have ended."""
+    number, _, machine = writer.partition("@")
+    if machine != _machine() or not number.isdigit() or os.name == "nt":  # to ask there is to end the process
+        return False
+    try:
+        os.kill(int(number), 0)
+    except ProcessLookupError:
+        return True
+    except PermissionError:
+        pass  # it is another user's
+    return False
 
 
 def _sync(path: Path) -> None:

@@ -23,7 +23,7 @@ from rasterio.transform import Affine
 from rasterio.windows import Window
 
 from .errors import InputError
-from .files import whole
+from .files import remove_abandoned, whole
 
 # GDAL would keep 5 % of the machine's memory in blocks, in each process.
 os.environ.setdefault("GDAL_CACHEMAX", "192")
@@ -189,9 +189,10 @@ class CogWriter:
 
     def __enter__(self) -> CogWriter:
         """Open the collecting file."""
+        remove_abandoned(self._path)
         self._whole = whole(self._path)
         self._part = self._whole.__enter__()
-        self._raw = self._part.with_name(self._part.name + ".raw.tif")
+        self._raw = self._part.with_name(self._part.name + ".raw.tmp")
         # An RGB image is masked by a fourth band; values carry nodata.
         extra = {"nodata": NODATA} if self._dtype == "float32" else {}
         self._file = rasterio.open(

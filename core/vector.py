@@ -17,7 +17,7 @@ from pyproj import CRS
 
 from .contract import VectorSource
 from .errors import InputError
-from .files import whole
+from .files import remove_abandoned, whole
 from .frames import transformer
 
 
@@ -165,6 +165,7 @@ def write_layer(
         column, mask = _typed(list(values))
         data.append(column)
         masks.append(mask)
+    remove_abandoned(path)
     with whole(path) as part:
         pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": modified})
         pyogrio.raw.write(

@@ -8,7 +8,7 @@ import laspy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import whole
+from ..files import remove_abandoned, whole
 
 _STEPS = 2**30  # steps of the file's whole numbers across the extent
 
@@ -31,5 +31,6 @@ def write_points(path: Path | str, xyz: NDArray[np.float64], *, rays: NDArray[np
     cloud.user_data = np.minimum(rays, 255).astype(np.uint8)
     cloud.residual = errors.astype(np.float32)
     cloud.return_number = cloud.number_of_returns = np.ones(len(xyz), np.uint8)
+    remove_abandoned(path)
     with whole(path) as part:
         cloud.write(str(part), do_compress=Path(path).suffix.lower() == ".laz")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import whole
+from ..files import remove_abandoned, whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,6 +76,7 @@ class Report:
             f"<style>{_STYLE}</style></head><body>{''.join(self._parts)}</body></html>\n"
         )
         for target in (path, copy) if copy else (path,):
+            remove_abandoned(target)
             with whole(target) as part:
                 part.write_text(page, encoding="utf-8")
 

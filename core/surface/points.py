@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from ..errors import InputError
-from ..files import whole
+from ..files import remove_abandoned, whole
 from ..raster import Grid
 
 _SCALE = 0.001  # metres
@@ -48,6 +48,7 @@ class PointWriter:
         header.scales = np.full(3, _SCALE)
         header.offsets = np.array([np.floor(self._grid.west), np.floor(self._grid.north), 0.0])
         header.add_crs(CRS.from_user_input(self._grid.crs))
+        remove_abandoned(self._path)
         self._whole = whole(self._path)
         part = self._whole.__enter__()
         self._file = laspy.open(part, mode="w", header=header, do_compress=Path(self._path).suffix.lower() == ".laz")
@@ -70,5 +71,9 @@ class PointWriter:
 
     def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
         """Finish the file, or remove it."""
-        self._file.close()
+        try:
+            self._file.close()
+        except BaseException as failure:
+            self._whole.__exit__(type(failure), failure, failure.__traceback__)
+            raise
         self._whole.__exit__(kind, error, trace)

@@ -94,6 +94,55 @@ def test_a_part_of_a_file_called_old_is_only_removed(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def dead():
+    """Return the id of a process that has ended."""
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        pass
+    return process.pid
+
+
+def test_what_a_kill_left_beside_a_target_goes_with_the_next_write(tmp_path):
+    """As for a raster among a user's files: its part and what GDAL put beside it, of a process that lives no more."""
+    target = tmp_path / "dsm [1].tif"
+    program = (
+        "import time\nfrom strandline.core.files import whole\n"
+        f"with whole({str(target)!r}) as part:\n    part.write_text('half')\n"
+        "    part.with_name(part.name + '.raw.tmp').touch(); part.with_name(part.name + '-journal').touch()\n"
+        "    print('ready', flush=True); time.sleep(60)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        files.remove_abandoned(target)
+        assert len(list(tmp_path.iterdir())) == 3  # it lives
+        process.kill()
+    files.remove_abandoned(target)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_parts_of_this_target_and_of_dead_processes_here_are_abandoned(tmp_path):
+    with files.whole(tmp_path / "dsm.tif") as part:
+        here = part.name.partition("@")[2].partition("-")[0]
+        part.touch()
+        gone = dead()
+        kept = [
+            part.name,  # this process's own
+            f"{files.PART}{gone}@{here}-a-dsm.tif",
+            f"{files.PART}{gone}@{here}-dsm.tif.aux",
+            f"{files.PART}{gone}@{here}-dsm.tiff",
+            f"{files.PART}{gone}@{'0' * len(here)}-dsm.tif",  # of another machine
+            f"{files.PART}1@{here}-dsm.tif",  # of a process that lives, and may be another user's
+            f"{files.PART}{gone}-dsm.tif",
+            f"{files.PART}x@{here}-dsm.tif",
+            "dsm.tif-journal",
+            "a.txt",
+        ]
+        for name in (*kept, f"{files.PART}{gone}@{here}-dsm.tif"):
+            (tmp_path / name).touch()
+        files.remove_abandoned(tmp_path / "dsm.tif")
+        assert sorted(p.name for p in tmp_path.iterdir()) == sorted(kept)
+    files.remove_abandoned(tmp_path / "nowhere" / "dsm.tif")
+
+
 def test_digests_are_of_content(tmp_path):
     path = tmp_path / "a"
     path.write_bytes(b"sand")
