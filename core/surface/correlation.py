@@ -63,6 +63,16 @@ def _window_sums(half: int, source: Floats, width: int, out: Floats, line: Float
 
 
 @nb.njit(cache=True, error_model="numpy")
+def _meet(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> bool:
+    """Tell whether two masks have a cell in common."""
+    for r in range(first.shape[0]):
+        for c in range(first.shape[1]):
+            if first[r, c] and second[r, c]:
+                return True
+    return False
+
+
+@nb.njit(cache=True, error_model="numpy")
 def correlate(views: Floats, seen: NDArray[np.bool_], small: int, large: int, noise: float, knee: float, score: Floats) -> None:
     """Score each cell of a plane of resampled ``views`` (m, rows, columns); NaN in them marks "not in this photograph".
 
@@ -81,7 +91,11 @@ def correlate(views: Floats, seen: NDArray[np.bool_], small: int, large: int, no
     adaptive = large > small
     # The small window that is centred like the large one starts this many places later.
     late = (large - small) * (width + 1)
-    pairs = m * (m - 1) // 2
+    meet, pairs = np.zeros((m, m), np.bool_), 0
+    for i in range(m):
+        for j in range(i + 1, m):
+            meet[i, j] = _meet(seen[i], seen[j])
+            pairs += meet[i, j]
     product, line, scratch = np.zeros(length, np.float32), np.zeros(length, np.float32), np.zeros(length, np.float32)
     near, far = np.zeros(length + late, np.float32), np.zeros(length, np.float32)
     centred = near[late:]
@@ -127,6 +141,8 @@ def correlate(views: Floats, seen: NDArray[np.bool_], small: int, large: int, no
         first = views[i].copy().ravel()
         mf, sf, mn, sn = mean_far[i], scale_far[i], mean_near[i], scale_near[i]
         for j in range(i + 1, m):
+            if not meet[i, j]:
+                continue
             second = views[j].copy().ravel()
             mg, sg, mo, so = mean_far[j], scale_far[j], mean_near[j], scale_near[j]
             value = rho[k]
@@ -161,6 +177,8 @@ def correlate(views: Floats, seen: NDArray[np.bool_], small: int, large: int, no
     k = 0
     for i in range(m):
         for j in range(i + 1, m):
+            if not meet[i, j]:
+                continue
             ai, aj, value = agreement[i], agreement[j], rho[k]
             for p in range(length):
                 valid = value[p] == value[p]

@@ -27,7 +27,7 @@ from .page import write_page
 from .plan import Plan, base_over_height, covered_bounds, fit_trend, ground_pixel, make_levels, search_range, snapped_grid
 from .points import check_points_destination
 
-_VERSION = 1  # of the algorithms; raised when the same request gives another surface
+_VERSION = 2  # of the algorithms; raised when the same request gives another surface
 _SCRATCH = "dense"
 _RASTERS = ("output", "precision", "correlation", "views", "filled", "ortho")
 _POOL = 4  # tiles from which on a pool of processes is worth its start

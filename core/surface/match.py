@@ -51,9 +51,11 @@ def match_tile(plan: Plan, tile: Tile) -> None:
     lattice = np.ascontiguousarray(base[every // 2 :: every, every // 2 :: every])
     views = choose(everyone, place.west, place.north, cell * every, lattice, MOST_VIEWS)
     seen = np.ones((len(views), *base.shape), bool)
-    if coarser:
-        for n, view in enumerate(views):
+    for n, view in enumerate(views):
+        if coarser:
             seen[n] = unhidden_by(coarser, view, tile, place) & _framed(view, place, cell, band, level.step)
+        else:
+            seen[n] = _somewhere_framed(view, place, cell, band, level.step)
     costs = _costs(plan, views, seen, band, place, cell, level.step, small, large)
     height, doubt = regularise(
         costs,
@@ -108,6 +110,15 @@ def _framed(view: TileView, place: Place, cell: float, band: Band, step: float) 
     whole = view.inside(place.west, place.north, cell, low) & view.inside(place.west, place.north, cell, high)
     side = 2 * band.border + 1
     return np.asarray(cv2.erode(whole.astype(np.uint8), np.ones((side, side), np.uint8)) > 0)
+
+
+def _somewhere_framed(view: TileView, place: Place, cell: float, band: Band, step: float) -> Mask:
+    """Tell at which cells a view may show something at some hypothesis; the others need not be looked at."""
+    base, seen = band.inner, np.zeros(band.first.shape, bool)
+    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+        height = (base + (band.first + share * band.count) * step).astype(np.float32)
+        seen |= view.inside(place.west, place.north, cell, height)
+    return np.asarray(cv2.dilate(seen.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
 
 
 def _costs(

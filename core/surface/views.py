@@ -62,10 +62,12 @@ _DISTINCT = 0.1
 
 
 def choose(views: list[TileView], west: float, north: float, cell: float, height: Floats, most: int) -> list[TileView]:
-    """Return up to ``most`` views that together measure a surface (rows, columns; no NaN) best.
+    """Return the views that together measure a surface (rows, columns; no NaN) best: at each place ``most``, if that many see it.
 
     Chosen one by one: what a view gains at a place falls with the number of views already there, with its obliqueness,
-    with its pixel against the finest one, and when it stands close to a chosen one. ``cell`` is the lattice's.
+    with its pixel against the finest one, and when it stands close to a chosen one; where ``most`` are chosen there is nothing
+    more to gain. So a tile that reaches over the whole survey, as coarse ones do, takes views all over it. ``cell`` is the
+    lattice's.
     """
     rows, columns = height.shape
     y, x = np.mgrid[0:rows, 0:columns]
@@ -88,8 +90,8 @@ def choose(views: list[TileView], west: float, north: float, cell: float, height
     gain = gain / np.where(finest > 0, finest, 1.0)
     there = np.zeros(len(points))
     chosen: list[int] = []
-    while len(chosen) < min(most, len(kept)):
-        value = (gain / (1.0 + there) ** 2).sum(axis=1)
+    while len(chosen) < len(kept):
+        value = (gain * (there < most) / (1.0 + there) ** 2).sum(axis=1)
         value[chosen] = 0.0
         best = int(np.argmax(value))
         if value[best] < 1e-3 * len(points):
