@@ -109,7 +109,12 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         scratch = survey.folder / _SCRATCH / digest(surface_key)
         plan = _plan(survey, georef, request, area, str(scratch), progress)
         _match(plan, request, progress.part(0.02, 0.9))
-        georeferencing = {"frame": asdict(georef.frame), "pivot": georef.pivot, "covariance": georef.covariance}
+        georeferencing = {
+            "frame": asdict(georef.frame),
+            "pivot": georef.pivot,
+            "covariance": georef.covariance,
+            "heights": georef.heights,
+        }
         parameters = {
             "resolution": plan.grid.cell,
             "window": request.window,
