@@ -89,7 +89,8 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     except OSError as error:
         # A full disk, a read-only folder or a vanished drive is the user's to mend, and says which file.
-        lines.send(type="error", kind="InputError", text=f"{error}.", traceback=traceback.format_exc())
+        what = "" if error.filename else " (is the disk full, or the user's share of it?)"
+        lines.send(type="error", kind="InputError", text=f"{error}{what}.", traceback=traceback.format_exc())
         return 1
     except Exception as error:
         return _bug(lines, error)

@@ -2,36 +2,57 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
 import re
 import shutil
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from .contract import encode
+from .errors import InputError
 
 PART = ".part-"  # marks what is not finished; whoever holds the survey may remove it
 _OLD = f"{PART}old-"  # marks a folder that is being replaced
+_SPARE = 1 << 16  # bytes; what libraries wrote without a word on a full disk may be short, so that some must be left
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _SIDECAR = re.compile(r"(\.[\w.]+\.tmp|-journal|-wal|-shm)?")  # what libraries put beside the file they are writing
 
 
 @contextmanager
-def whole(path: Path | str) -> Iterator[Path]:
+def whole(path: Path | str, *, room: int = 0, before: Callable[[], None] | None = None) -> Iterator[Path]:
     """Yield a temporary path beside ``path`` (same suffix); it replaces ``path`` on success and is removed on failure.
 
-    The body may make a file or a folder there. A folder replaces the folder that stood at ``path``.
+    The body may make a file or a folder there. A folder replaces the folder that stood at ``path``. ``room`` bytes are made sure
+    of first, for libraries that end the process when a disk is full. ``before`` is called when all is written, before anything
+    that stands is touched: to drop a record that will not be true any more.
+
+    Raises
+    ------
+    InputError
+        When the disk is full, or the user's share of it.
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f"{PART}{_writer()}-{target.name}")
     remove(part)
     try:
-        yield part
+        try:
+            _claim(part, room)
+            yield part
+        except Exception as error:
+            if isinstance(error, OSError) and error.errno in _FULL:
+                raise
+            _claim(_beside(part), _SPARE)  # a full disk is what most libraries' errors in writing come from
+            raise
+        _claim(_beside(part), _SPARE)
+        if before is not None:
+            before()
         if part.is_dir() and target.is_dir():
             old = target.with_name(f"{_OLD}{_writer()}-{target.name}")
             target.rename(old)
@@ -40,8 +61,31 @@ def whole(path: Path | str) -> Iterator[Path]:
         else:
             _sync(part)
             part.replace(target)
+    except OSError as error:
+        _discard(part)
+        if error.errno in _FULL:
+            raise InputError(
+                f"{target} cannot be written, for the disk is full: free some space and run the step again."
+            ) from error
+        raise
     except BaseException:
-        remove(part)
+        _discard(part)
+        raise
+
+
+def require_room(folder: Path) -> None:
+    """Refuse to start where nothing can be written.
+
+    Raises
+    ------
+    InputError
+        When the disk of ``folder`` is full, or the user's share of it.
+    """
+    try:
+        _claim(folder / f"{PART}{_writer()}-room.tmp", _SPARE)
+    except OSError as error:
+        if error.errno in _FULL:
+            raise _full(folder) from error
         raise
 
 
@@ -76,13 +120,9 @@ def remove_abandoned(path: Path | str) -> None:
     Only parts of this very target go, and only those whose process was one of this machine and lives no more.
     """
     target = Path(path)
-    if not target.parent.is_dir():
-        return
-    for entry in list(os.scandir(target.parent)):
-        writer, _, name = entry.name.removeprefix(PART).partition("-")
-        ours = entry.name.startswith(PART) and name.startswith(target.name) and _SIDECAR.fullmatch(name[len(target.name) :])
-        if ours and _is_gone(writer):
-            remove(Path(entry.path))
+    for writer, part in _parts_of(target):
+        if _is_gone(writer):
+            remove(part)
 
 
 def digest(*values: Any) -> str:
@@ -100,6 +140,51 @@ def file_digest(path: Path | str) -> str:
 def bytes_digest(data: bytes) -> str:
     """Return the fingerprint that ``file_digest`` has of a file with this content."""
     return hashlib.blake2b(data, digest_size=16).hexdigest()
+
+
+def _parts_of(target: Path) -> list[tuple[str, Path]]:
+    """Return what stands unfinished of ``target``, with who wrote it."""
+    found = []
+    for entry in os.scandir(target.parent) if target.parent.is_dir() else ():
+        writer, _, name = entry.name.removeprefix(PART).partition("-")
+        if entry.name.startswith(PART) and name.startswith(target.name) and _SIDECAR.fullmatch(name[len(target.name) :]):
+            found.append((writer, Path(entry.path)))
+    return found
+
+
+def _discard(part: Path) -> None:
+    """Remove a part of ours and what a library left beside it."""
+    remove(part)
+    for ending in ("-journal", "-wal", "-shm"):
+        remove(part.with_name(part.name + ending))
+
+
+def _full(path: Path) -> InputError:
+    return InputError(f"{path} cannot be written, for the disk is full: free some space and run the step again.")
+
+
+def _beside(part: Path) -> Path:
+    return part.with_name(f"{part.name}.room.tmp")
+
+
+def _claim(path: Path, size: int) -> None:
+    """Make sure that a file of ``size`` bytes finds room at ``path``, and remove it again.
+
+    Raises
+    ------
+    OSError
+        When it does not.
+    """
+    if size == 0:
+        return
+    try:
+        with path.open("wb") as stream:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(stream.fileno(), 0, size)
+            else:
+                stream.truncate(size)
+    finally:
+        path.unlink(missing_ok=True)
 
 
 def _machine() -> str:

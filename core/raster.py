@@ -222,7 +222,11 @@ class CogWriter:
         values = patch.values
         if self._dtype == "float32":
             values = np.where(np.isnan(values), np.float32(NODATA), values).astype(np.float32)
-        self._file.write(values, window=Window(patch.column, patch.row, values.shape[2], values.shape[1]))
+        window = Window(patch.column, patch.row, values.shape[2], values.shape[1])
+        try:
+            self._file.write(values, window=window)
+        except RasterioError as error:
+            raise InputError(f"The raster {self._path} cannot be written ({error}): is there room on its disk?") from error
 
     def read(self, column: int, row: int, width: int, height: int) -> NDArray[Any]:
         """Return what has been collected in a window (bands, rows, columns), nodata as it is on disk."""
@@ -231,23 +235,27 @@ class CogWriter:
     def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
         """Finish the raster, or remove what was collected."""
         try:
-            if kind is None:
-                for band, name in enumerate(self._names, start=1):
-                    self._file.set_band_description(band, name)
-                self._file.update_tags(AREA_OR_POINT="Area", **self._tags)
-                if self._bands == 4:
-                    self._file.colorinterp = tuple(
-                        getattr(rasterio.enums.ColorInterp, c) for c in ("red", "green", "blue", "alpha")
-                    )
-            self._file.close()
-            if kind is None:
-                self._finish()
-        except BaseException as failure:
+            try:
+                if kind is None:
+                    for band, name in enumerate(self._names, start=1):
+                        self._file.set_band_description(band, name)
+                    self._file.update_tags(AREA_OR_POINT="Area", **self._tags)
+                    if self._bands == 4:
+                        self._file.colorinterp = tuple(
+                            getattr(rasterio.enums.ColorInterp, c) for c in ("red", "green", "blue", "alpha")
+                        )
+                self._file.close()
+                if kind is None:
+                    self._finish()
+            except BaseException as failure:
+                self._whole.__exit__(type(failure), failure, failure.__traceback__)
+                raise
+            self._whole.__exit__(kind, error, trace)
+        except RasterioError as failure:
+            raise InputError(f"The raster {self._path} cannot be written ({failure}): is there room on its disk?") from failure
+        finally:
+            # Only now, so that what stands shows whether the disk was full.
             self._raw.unlink(missing_ok=True)
-            self._whole.__exit__(type(failure), failure, failure.__traceback__)
-            raise
-        self._raw.unlink(missing_ok=True)
-        self._whole.__exit__(kind, error, trace)
 
     def _finish(self) -> None:
         rasterio.shutil.copy(

@@ -19,7 +19,7 @@ from typing import Any
 
 from .contract import decode, encode
 from .errors import InputError
-from .files import file_digest, remove_parts, write_json
+from .files import file_digest, remove_parts, require_room, write_json
 
 VERSION = 1
 _FILE = "survey.json"
@@ -242,7 +242,7 @@ def held(folder: Path | str, step: str, *, make: bool = False) -> Iterator[None]
     Raises
     ------
     InputError
-        When there is no such folder, or another process holds the survey; the message names it.
+        When there is no such folder, its disk is full, or another process holds the survey; the message names it.
     """
     target = Path(folder)
     if make:
@@ -257,11 +257,12 @@ def held(folder: Path | str, step: str, *, make: bool = False) -> Iterator[None]
             raise InputError(
                 f"The survey {target} is in use by {stream.read().strip() or 'another process'}: wait for it or stop it."
             ) from error
+        for place in (target, *(p for p in target.iterdir() if p.is_dir())):
+            remove_parts(place)
+        require_room(target)
         stream.truncate(0)
         stream.write(f"{step} (process {os.getpid()} on {socket.gethostname()})\n")
         stream.flush()
-        for place in (target, *(p for p in target.iterdir() if p.is_dir())):
-            remove_parts(place)
         try:
             yield
         finally:

@@ -168,18 +168,21 @@ def write_layer(
     remove_abandoned(path)
     with whole(path) as part:
         pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": modified})
-        pyogrio.raw.write(
-            part,
-            geometry=None if geometry is None else np.asarray(shapely.to_wkb(np.asarray(geometry, object), flavor="iso")),
-            field_data=data,
-            field_mask=masks,
-            fields=np.array(names, object),
-            geometry_type=None if geometry is None else kind,
-            crs=CRS.from_user_input(crs).to_wkt() if crs else None,
-            layer=layer,
-            driver="GPKG",
-            dataset_options={"VERSION": "1.3"},  # 1.4 makes older GDAL, of QGIS 3.22 for one, complain
-        )
+        try:
+            pyogrio.raw.write(
+                part,
+                geometry=None if geometry is None else np.asarray(shapely.to_wkb(np.asarray(geometry, object), flavor="iso")),
+                field_data=data,
+                field_mask=masks,
+                fields=np.array(names, object),
+                geometry_type=None if geometry is None else kind,
+                crs=CRS.from_user_input(crs).to_wkt() if crs else None,
+                layer=layer,
+                driver="GPKG",
+                dataset_options={"VERSION": "1.3"},  # 1.4 makes older GDAL, of QGIS 3.22 for one, complain
+            )
+        except (pyogrio.errors.DataSourceError, pyogrio.errors.FeatureError) as error:
+            raise InputError(f"The layer {path} cannot be written ({error}): is there room on its disk?") from error
 
 
 def _typed(values: list[Any]) -> tuple[NDArray[Any], NDArray[np.bool_]]:

@@ -121,8 +121,6 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             progress.warn(text)
         standing = survey.record(STEP)
         if standing is None or standing.fingerprint != fingerprint or survey.is_stale(STEP) or not _complete(survey):
-            # A kill from here to finish() leaves a survey that is not georeferenced, never one whose two files disagree.
-            survey.forget(STEP)
             write_transformed(model, solution.fit.similarity, survey)
             georef.write(survey)
         progress.at(0.8)
@@ -145,7 +143,8 @@ def write_transformed(model: pycolmap.Reconstruction, similarity: Similarity, su
     """Write ``model``, moved by the similarity, as the survey's georeferenced model; ids stay. ``model`` is moved in place."""
     turn = pycolmap.Rotation3d(similarity.rotation)
     model.transform(pycolmap.Sim3d(similarity.scale, turn, similarity.shift))
-    with whole(survey.folder / FOLDER) as part:
+    # A kill from there to finish() leaves a survey that is not georeferenced, never one whose two files disagree.
+    with whole(survey.folder / FOLDER, before=lambda: survey.forget(STEP)) as part:
         part.mkdir()
         model.write(part)
 

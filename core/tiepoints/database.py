@@ -6,7 +6,7 @@ It can be opened by any COLMAP of the version that the engine has. Descriptors a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import cv2  # noqa: F401 - before pycolmap, whose PNG library otherwise crashes OpenCV's
@@ -35,16 +35,21 @@ def write_database(
     photographs: Sequence[Photograph],
     keypoints: Iterable[NDArray[np.float32]],
     pairs: Mapping[tuple[int, int], PairMatches],
+    *,
+    before: Callable[[], None] | None = None,
 ) -> None:
-    """Write a database whose image ids are 1 + the index in ``photographs``.
+    """Write a database whose image ids are 1 + the index in ``photographs``; ``before`` is called before it takes its place.
 
     ``keypoints`` (n, 4: x, y, scale, angle) come in the photographs' order; ``pairs`` maps two indices, the smaller first.
     Photographs of one ``camera`` group and size share a camera.
     """
-    with whole(path) as part:
+    points = list(keypoints)
+    # Until SQLite is closed it keeps all twice; matches are written twice; and a full disk would end the process.
+    room = 3 * (sum(p.nbytes for p in points) + 2 * sum(p.matches.nbytes for p in pairs.values())) + (1 << 20)
+    with whole(path, room=room, before=before) as part:
         database = pycolmap.Database.open(part)
         try:
-            _fill(database, photographs, keypoints, pairs)
+            _fill(database, photographs, points, pairs)
         finally:
             database.close()
 

@@ -96,8 +96,8 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
                 f"No two photographs of {survey.folder} share {matching.LEAST} points: check that they overlap"
                 + ("." if enhanced else ", and run strandline:enhance first.")
             )
-        survey.forget("tiepoints")
-        write_database(survey.folder / NAME, photographs, (read_features(path).keypoints() for path in found), pairs)
+        keypoints = (read_features(path).keypoints() for path in found)
+        write_database(survey.folder / NAME, photographs, keypoints, pairs, before=lambda: survey.forget("tiepoints"))
         match_count = sum(len(p.matches) for p in pairs.values())
         groups = blocks(len(photographs), pairs)
         if len(groups) > 1:
