@@ -57,9 +57,9 @@ class DsmDifference(StepAlgorithm):
             "COREGISTER",
             tr("Co-registration"),
             tr(
-                "How the later surface is brought onto the earlier one on stable ground: not at all (none), by its median "
-                "height (vertical), by a tilted plane (plane), or also in plan (horizontal); auto chooses what that ground "
-                "supports."
+                "What is taken off the difference: nothing (none), the median of stable ground (vertical), its tilted plane "
+                "(plane), or what stable ground and the georeferencing of both surfaces tell together (auto). What is left in is "
+                "counted in the deviations. A shift in plan (horizontal) is not yet available and is refused."
             ),
             ("auto", "none", "vertical", "plane", "horizontal"),
             default="auto",

@@ -224,8 +224,8 @@
    <translation>Recalage</translation>
   </message>
   <message>
-   <source>How the later surface is brought onto the earlier one on stable ground: not at all (none), by its median height (vertical), by a tilted plane (plane), or also in plan (horizontal); auto chooses what that ground supports.</source>
-   <translation>Comment la surface récente est ramenée sur l'ancienne en terrain stable : pas du tout (none), par sa hauteur médiane (vertical), par un plan incliné (plane) ou aussi en planimétrie (horizontal) ; auto choisit ce que ce terrain permet.</translation>
+   <source>What is taken off the difference: nothing (none), the median of stable ground (vertical), its tilted plane (plane), or what stable ground and the georeferencing of both surfaces tell together (auto). What is left in is counted in the deviations. A shift in plan (horizontal) is not yet available and is refused.</source>
+   <translation>Ce qui est retiré de la différence : rien (none), la médiane du terrain stable (vertical), son plan incliné (plane), ou ce que le terrain stable et le géoréférencement des deux surfaces indiquent ensemble (auto). Ce qui reste est compté dans les écarts-types. Un décalage en planimétrie (horizontal) n'est pas encore disponible et est refusé.</translation>
   </message>
   <message>
    <source>Level of detection</source>

@@ -151,7 +151,6 @@ def difference(qgis: Qgis, simulation: Path, folder: Path) -> dict[str, object]:
         AFTER_PRECISION=after / "precision.tif",
         ZONES=simulation / "zones.gpkg",
         STABLE=simulation / "stable.gpkg",
-        COREGISTER="plane",  # six control points leave each surface a tilt of about 1 mm per metre
         OUTPUT=place / "difference.tif",
         SIGNIFICANT=place / "significant.tif",
         VOLUMES=place / "volumes.gpkg",

@@ -1,4 +1,4 @@
-"""Stable ground: what the difference is where nothing moved, and the shift or plane taken off it."""
+"""Stable ground: what the difference is where nothing moved, and the shift, plane or adjusted surface taken off it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..errors import NotEnoughData
 
 Array = NDArray[np.float64]
-_HUBER = 1.345  # 95 % efficiency on normal errors
-_LEAST = 10  # cells of stable ground that a shift can be taken from
-Method = Literal["none", "vertical", "plane"]
+_HUBER, _BIWEIGHT = 1.345, 4.685  # 95 % efficiency on normal errors
+LEAST = 10  # cells of stable ground that a shift can be taken from
+Method = Literal["none", "vertical", "plane", "combined"]
 
 
 @dataclass(frozen=True)
@@ -31,28 +31,36 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Shift:
-    """What is subtracted from the difference: ``coefficients`` (1,) or (3,) of 1, x - x0, y - y0 about ``centre``."""
+    """What is subtracted from the difference, an affine function of the place.
+
+    ``coefficients`` (1,), (3,) or (4,) are those of 1, x - x0, y - y0, BEFORE's height - z0 about ``centre`` (x0, y0, z0). The
+    method "combined" is what stable ground and both georeferencings tell together.
+    """
 
     method: Method
     coefficients: tuple[float, ...] = (0.0,)
-    centre: tuple[float, float] = (0.0, 0.0)
+    centre: tuple[float, ...] = (0.0, 0.0)
 
-    def at(self, x: Array, y: Array) -> Array:
-        """Return the shift (m) at places of any matching shapes."""
-        c = self.coefficients
-        if len(c) == 1:
-            return np.full(np.broadcast_shapes(np.shape(x), np.shape(y)), c[0])
-        return np.asarray(c[0] + c[1] * (x - self.centre[0]) + c[2] * (y - self.centre[1]))
+    def at(self, x: Array, y: Array, height: Array | None = None) -> Array:
+        """Return the shift (m) at places of any matching shapes; ``height`` is needed by four coefficients."""
+        level, *slopes = self.coefficients
+        places = (x, y) if height is None else (x, y, height)
+        shape = np.broadcast_shapes(*(np.shape(v) for v in places))
+        # A centre is as long as the slopes, but for one that is not used; zip says so when a height is missing.
+        count = len(slopes)
+        terms = zip(slopes, places[:count], self.centre[:count], strict=True)
+        return level + sum((slope * (v - v0) for slope, v, v0 in terms), np.zeros(shape))
 
     def describe(self) -> str:
         """Return it in words."""
         if self.method == "none":
             return "none"
-        text = f"{self.coefficients[0]:+.4f} m"
-        if len(self.coefficients) == 3:
-            text += (
-                f", tilt {1e3 * self.coefficients[1]:+.4f} mm/m to the east, {1e3 * self.coefficients[2]:+.4f} mm/m to the north"
-            )
+        level, *slopes = self.coefficients
+        text = f"{level:+.4f} m"
+        if slopes:
+            text += f", tilt {1e3 * slopes[0]:+.4f} mm/m to the east, {1e3 * slopes[1]:+.4f} mm/m to the north"
+        if len(slopes) == 3:
+            text += f", {1e3 * slopes[2]:+.4f} mm per metre of height"
         return text
 
 
@@ -89,9 +97,9 @@ def fit_shift(method: Method, x: Array, y: Array, change: Array) -> Shift:
     """
     if method == "none":
         return Shift("none")
-    if len(change) < _LEAST:
+    if len(change) < LEAST:
         raise NotEnoughData(
-            f"STABLE covers {len(change)} cells with a height in both rasters and {_LEAST} are needed: "
+            f"STABLE covers {len(change)} cells with a height in both rasters and {LEAST} are needed: "
             "draw larger stable areas, or set COREGISTER to none."
         )
     if method == "vertical":
@@ -101,21 +109,33 @@ def fit_shift(method: Method, x: Array, y: Array, change: Array) -> Shift:
     spread = np.linalg.svd(design[:, 1:], compute_uv=False) / np.sqrt(len(x))
     if spread[-1] < 0.02 * spread[0]:
         raise NotEnoughData("STABLE lies on one line, which leaves a plane free to tilt about it: add stable ground beside it.")
-    weights: Array = np.ones(len(change))
-    coefficients: Array = np.zeros(3)
-    for _ in range(50):
-        root = np.sqrt(weights)
-        new = np.asarray(np.linalg.lstsq(design * root[:, None], change * root, rcond=None)[0], np.float64)
-        residual = change - design @ new
-        scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-12)
-        weights = np.asarray(np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(residual), 1e-300)), np.float64)
-        settled = np.allclose(new, coefficients, rtol=1e-9, atol=1e-12)
-        coefficients = new
-        if settled:
-            break
-    return Shift("plane", (float(coefficients[0]), float(coefficients[1]), float(coefficients[2])), centre)
+    level, east, north = robust_fit(design, change).tolist()
+    return Shift("plane", (level, east, north), centre)
 
 
-def plane_design(x: Array, y: Array, centre: tuple[float, float]) -> Array:
+def robust_fit(design: Array, values: Array) -> Array:
+    """Return coefficients (p,) of ``design`` (n, p): Huber's M-estimate, and from there Tukey's biweight, blind to what moved."""
+    coefficients = np.asarray(np.linalg.lstsq(design, values, rcond=None)[0], np.float64)
+    for rule in (_huber, _biweight):
+        for _ in range(50):
+            residual = np.abs(values - design @ coefficients)
+            root = np.sqrt(rule(residual / max(1.4826 * float(np.median(residual)), 1e-12)))
+            new = np.asarray(np.linalg.lstsq(design * root[:, None], values * root, rcond=None)[0], np.float64)
+            settled = np.allclose(new, coefficients, rtol=1e-9, atol=1e-12)
+            coefficients = new
+            if settled:
+                break
+    return coefficients
+
+
+def _huber(size: Array) -> Array:
+    return np.asarray(np.minimum(1.0, _HUBER / np.maximum(size, 1e-300)), np.float64)
+
+
+def _biweight(size: Array) -> Array:
+    return np.asarray((1.0 - np.minimum(size / _BIWEIGHT, 1.0) ** 2) ** 2, np.float64)
+
+
+def plane_design(x: Array, y: Array, centre: tuple[float, ...]) -> Array:
     """Return the columns 1, x - x0, y - y0 (n, 3)."""
     return np.column_stack([np.ones(len(x)), x - centre[0], y - centre[1]])

@@ -74,7 +74,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Stable:
-    """A random sample of the ``count`` cells of stable ground: row, column, place (m), change and sigma (n,).
+    """A random sample of the ``count`` cells of stable ground: row, column, place (m), height before, change and sigma (n,).
 
     ``patches`` are whole patches of neighbours, for what goes with distance; None when the sample is all there is.
     """
@@ -83,6 +83,7 @@ class Stable:
     column: NDArray[np.int64]
     x: Array
     y: Array
+    height: Array
     change: Array
     sigma: Array | None
     count: int
@@ -110,7 +111,7 @@ class Outcome:
 def stable_ground(pair: Pair, stable: list[Any], sigma: Sigma | None, progress: Progress) -> Stable:
     """Return the change of the cells of which at least half lies on stable ground."""
     grid = pair.grid
-    sample, patches = Sample(_STABLE_CELLS, 6), Sample(_STABLE_CELLS, 6)
+    sample, patches = Sample(_STABLE_CELLS, 7), Sample(_STABLE_CELLS, 7)
     tree = shapely.STRtree(stable)
     for column, row, width, height in progress.over(pair.tiles()):
         window = grid.window(column, row, width, height)
@@ -120,12 +121,12 @@ def stable_ground(pair: Pair, stable: list[Any], sigma: Sigma | None, progress: 
         inside = touched([stable[i] for i in near], window, 0.5)
         if not inside.any():
             continue
-        change, _ = pair.change(window)
+        change, before = pair.change(window)
         spread = np.zeros_like(change) if sigma is None else sigma.at(window)
         rows, columns = np.nonzero(inside & np.isfinite(change) & np.isfinite(spread))
         r, c = rows + row, columns + column
         x, y = grid.centres(r, c)
-        values = (r.astype(float), c.astype(float), x, y, change[rows, columns], spread[rows, columns])
+        values = (r.astype(float), c.astype(float), x, y, before[rows, columns], change[rows, columns], spread[rows, columns])
         sample.add(r * grid.width + c, *values)
         patches.add(r * grid.width + c, *values, patches=(r // _PATCH) * grid.width + c // _PATCH)
     found = _stable(sample, sigma is not None)
@@ -167,7 +168,7 @@ def difference(
             _thin(outcome.height, thinning, column, row, before[inner])
             if np.isnan(change[inner]).all():
                 continue  # the files begin without data
-            change = change - _shift_on(shift, around)
+            change = change - _shift_on(shift, around, before)
             spread = kept = None
             if sigma is not None:
                 spread = sigma.at(around)
@@ -196,8 +197,8 @@ def difference(
 
 
 def _stable(sample: Sample, sigma_known: bool) -> Stable:
-    r, c, x, y, change, spread = sample.values.T
-    return Stable(r.astype(np.int64), c.astype(np.int64), x, y, change, spread if sigma_known else None, sample.count)
+    r, c, x, y, height, change, spread = sample.values.T
+    return Stable(r.astype(np.int64), c.astype(np.int64), x, y, height, change, spread if sigma_known else None, sample.count)
 
 
 def _one(source: Aligned | float | None, window: Grid) -> Array:
@@ -216,9 +217,9 @@ def _with_halo(grid: Grid, column: int, row: int, width: int, height: int, halo:
     return around, (slice(top, top + height), slice(left, left + width))
 
 
-def _shift_on(shift: Shift, window: Grid) -> Array:
+def _shift_on(shift: Shift, window: Grid, height: Array) -> Array:
     x, y = window.centres(np.arange(window.height), np.arange(window.width))
-    return shift.at(x[None, :], y[:, None])
+    return shift.at(x[None, :], y[:, None], height)
 
 
 def _thin(map_: Array, step: int, column: int, row: int, values: Array) -> None:

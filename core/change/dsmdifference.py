@@ -13,16 +13,17 @@ import shapely
 from ..contract import RasterSource, VectorSource
 from ..errors import InputError
 from ..progress import SILENT, Progress
-from ..raster import check_destination
 from .alignment import Aligned, common_grid, link_accuracy
-from .coregistration import Method, Shift, fit_shift, statistics
-from .difference import Pair, Sigma, Stable, difference, stable_ground
-from .errormodel import error_model, systematic_error
+from .coregistration import Method, Shift, statistics
+from .difference import Pair, Sigma, difference, stable_ground
+from .errormodel import error_model, height_error, systematic_error
 from .georeferencing import require_one_reference
+from .heard import Heard
 from .heights import Heights, open_heights
 from .report import Findings, write_report
 from .units import true_area
-from .volumes import Volume
+from .validation import validate
+from .volumes import Volume, without_precision
 from .volumetable import write_volumes
 from .zones import Zone, read_zones, union
 
@@ -79,8 +80,8 @@ class Result:
 
 def run(request: Request, progress: Progress = SILENT) -> Result:
     """Compute the difference and the volumes."""
-    _validate(request)
-    heard = _Heard(progress)
+    validate(request)
+    heard = Heard(progress)
     progress = Progress(heard)
     with ExitStack() as files:
         heights = [
@@ -117,9 +118,9 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
                 files.enter_context(precision)
         sigma = _given_sigma(request, pair, precisions)
         ground = stable_ground(pair, stable, sigma, progress.part(0.25, 0.4)) if stable else None
-        shift = _shift(request, ground)
+        shift, known = height_error(_method(request), ground, (before, after), grid, zones, progress)
         if ground is not None and len(ground.change):
-            ground_after = ground.change - shift.at(ground.x, ground.y)
+            ground_after = ground.change - shift.at(ground.x, ground.y, ground.height)
             stats = statistics(ground.change), statistics(ground_after)
             if sigma is None:
                 sigma = Sigma(common=stats[1].nmad)
@@ -139,8 +140,9 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         if ground is not None and ground.sigma is None and sigma is not None and sigma.common is not None:
             ground = ground.with_sigma(sigma.common)
         steps = (grid.step_north, grid.cell)
-        model, variogram = error_model(request.correlation_range, ground, shift, sigma is not None, steps, progress)
-        systematic = systematic_error(request.registration_sigma, shift, ground, variogram, before, after, grid.crs)
+        expected = known.shift if known else shift
+        model, variogram = error_model(request.correlation_range, ground, expected, sigma is not None, steps, progress)
+        systematic = systematic_error(request.registration_sigma, shift, known)
 
         shapes = [zone.shape for zone in zones]
         whole = union(zones) if len(zones) > 1 else shapes[0]
@@ -159,10 +161,11 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         )
     if outcome.moved == 0:
         progress.warn("BEFORE and AFTER are identical: no cell differs.")
-    if outcome.without_sigma:
-        progress.warn(f"{outcome.without_sigma} cells have a change but no precision: they are never significant.")
     volumes = [tally.volume(model, systematic) for tally in outcome.tallies]
     total = volumes[-1]
+    if outcome.without_sigma:
+        names = [zone.name for zone in zones] + ["all zones"]
+        progress.warn(without_precision(outcome.without_sigma, names, outcome.tallies))
     empty = [zone.name for zone, volume in zip(zones, volumes, strict=False) if volume.net is None]
     if empty:
         progress.warn(f"No cell of {', '.join(empty)} has a height in both rasters: their volumes are not known.")
@@ -182,6 +185,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
                 confidence=request.confidence,
                 method=request.lod,
                 shift=shift,
+                known=known,
                 stable=stats,
                 model=model,
                 variogram=variogram,
@@ -191,59 +195,6 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         )
     progress.at(1.0)
     return _result(request, total)
-
-
-class _Heard:
-    """A listener that passes everything on and remembers the warnings, for the report."""
-
-    def __init__(self, progress: Progress) -> None:
-        self._progress, self._done, self.warnings = progress, 0.0, list[str]()
-
-    def fraction(self, value: float) -> None:
-        self._done = max(self._done, value)  # a raster with an undeclared no-data value is read again
-        self._progress.at(self._done)
-
-    def message(self, text: str, *, warning: bool) -> None:
-        if warning:
-            self.warnings.append(text)
-            self._progress.warn(text)
-        else:
-            self._progress.info(text)
-
-    def cancelled(self) -> bool:
-        return False  # the outer progress raises
-
-
-def _validate(request: Request) -> None:
-    """Refuse, before any work, what cannot be meant."""
-    if not 0.0 < request.confidence < 1.0:
-        raise InputError(f"CONFIDENCE is {request.confidence:g}: give a number between 0 and 1, such as 0.95.")
-    for name in ("before_sigma", "after_sigma", "registration_sigma", "correlation_range"):
-        value = getattr(request, name)
-        if value is not None and value < 0:
-            raise InputError(f"{name.upper()} is {value:g}: give metres that are not negative.")
-    for side in ("before", "after"):
-        if getattr(request, f"{side}_sigma") is not None and getattr(request, f"{side}_precision") is not None:
-            raise InputError(f"{side.upper()}_SIGMA and {side.upper()}_PRECISION are both given: give one of them.")
-    if request.coregister == "horizontal":
-        raise InputError(
-            "COREGISTER=horizontal is not offered: a beach hardly tells a horizontal shift; choose vertical, plane or none."
-        )
-    if request.coregister in ("vertical", "plane") and request.stable is None:
-        raise InputError(f"COREGISTER={request.coregister} needs STABLE: draw polygons on ground that has not moved.")
-    sources = (request.before, request.after, request.before_precision, request.after_precision)
-    inputs = {Path(s.path).resolve() for s in sources if s}
-    outputs = [p for p in (request.output, request.significant, request.volumes, request.output_html_file) if p]
-    if len({Path(p).resolve() for p in outputs}) < len(outputs):
-        raise InputError("Two outputs have the same name: give each its own.")
-    for path in outputs:
-        if Path(path).resolve() in inputs:
-            raise InputError(f"The output {path} is also an input: choose another name.")
-    for raster in (request.output, request.significant):
-        if raster:
-            check_destination(raster)
-    if request.volumes and Path(request.volumes).suffix.lower() != ".gpkg":
-        raise InputError(f"The layer {request.volumes} must be a GeoPackage: give a name that ends in .gpkg.")
 
 
 def _same_file(first: str, second: str) -> bool:
@@ -266,15 +217,9 @@ def _given_sigma(request: Request, pair: Pair, precisions: list[Heights | None])
     return Sigma(before, after)
 
 
-def _shift(request: Request, ground: Stable | None) -> Shift:
-    method: Method
-    if request.coregister == "auto":
-        method = "vertical" if ground is not None else "none"
-    else:
-        method = "none" if request.coregister == "horizontal" else request.coregister
-    if ground is None:
-        return Shift("none")
-    return fit_shift(method, ground.x, ground.y, ground.change)
+def _method(request: Request) -> Method | None:
+    """Return the correction that is asked for, None to take off what is expected."""
+    return None if request.coregister == "auto" or request.coregister == "horizontal" else request.coregister
 
 
 def _sigma_words(request: Request, sigma: Sigma | None) -> str:

@@ -1,4 +1,4 @@
-"""Which error model holds: from stable ground where it can tell, else from what the user says, else not known."""
+"""Which error model holds: from stable ground and the georeferencings, else from what the user says, else not known."""
 
 from __future__ import annotations
 
@@ -7,12 +7,57 @@ from dataclasses import replace
 import numpy as np
 
 from ..progress import Progress
-from .coregistration import Shift, plane_design
+from ..raster import Grid
+from .coregistration import LEAST, Method, Shift, fit_shift
 from .difference import Stable
 from .georeferencing import Georeferenced, georeferenced
+from .heighterror import HeightError, from_both, from_georeferencing, from_plane, from_stable
 from .heights import Heights
-from .uncertainty import SAMPLE, ErrorModel, Fitted, Given, Systematic, fit_covariance
+from .uncertainty import ErrorModel, Fitted, Given, Systematic
 from .variogram import Variogram, fit_variogram
+from .zones import Zone
+
+
+def height_error(
+    method: Method | None,
+    ground: Stable | None,
+    models: tuple[Heights, Heights],
+    grid: Grid,
+    zones: list[Zone],
+    progress: Progress,
+) -> tuple[Shift, HeightError | None]:
+    """Return what to take off the difference, and what is known of the error that it corrects; None: nothing.
+
+    ``method`` None takes off what is expected: of stable ground and georeferencings together where both DSMs carry theirs, else
+    of stable ground alone. Another method is carried out as asked, and what it leaves stays known.
+
+    Raises
+    ------
+    NotEnoughData
+        When stable ground does not determine what is asked for.
+    """
+    steps = (grid.step_north, grid.cell)
+    prior = _prior(models, grid.crs)
+    level = None if ground is None or method == "none" else fit_shift("vertical", ground.x, ground.y, ground.change)
+    if ground is None or (method == "none" and (prior is None or len(ground.change) < LEAST)):
+        west, south, east, north = grid.bounds
+        centre = ((west + east) / 2, (south + north) / 2, 0.0)
+        return Shift("none"), None if prior is None else from_georeferencing(prior, centre)
+    applied = level if method == "vertical" else None if method is None else fit_shift(method, ground.x, ground.y, ground.change)
+    if prior is not None:
+        known = from_both(ground, prior, steps, progress)
+    elif applied is not None and method == "plane":
+        known = from_plane(ground, applied, steps)
+    else:
+        assert level is not None
+        known = from_stable(ground, level, zones, steps, progress)
+    shift = applied or known.shift
+    if known.exceeded_by(shift):
+        progress.warn(
+            f"COREGISTER={method} leaves an error that STABLE shows ({known.shift.describe()}): "
+            "set COREGISTER to auto to take it off."
+        )
+    return shift, known
 
 
 def error_model(
@@ -45,24 +90,19 @@ def error_model(
     return ErrorModel(float(np.sqrt(told.nugget)), tuple((float(np.sqrt(s)), r) for s, r in told.structures)), told
 
 
-def systematic_error(
-    given: float | None,
-    shift: Shift,
-    ground: Stable | None,
-    variogram: Variogram | None,
-    before: Heights,
-    after: Heights,
-    crs: str,
-) -> Systematic:
-    """Return what is common to all cells: the fitted shift's own error, else REGISTRATION_SIGMA, else the georeferencing's."""
-    if shift.method != "none" and ground is not None and variogram is not None:
-        return _of_fit(shift, ground, variogram)
-    if given is not None or shift.method != "none":
+def systematic_error(given: float | None, applied: Shift, known: HeightError | None) -> Systematic:
+    """Return what is common to all cells: what is not known of the height error, and what is known of it but left in.
+
+    ``given``, REGISTRATION_SIGMA, counts where nothing is taken off, where nothing else is known, and for an unknown tilt.
+    """
+    if known is None or known.covariance is None or (applied.method == "none" and given is not None):
         return Given(given)
-    blocks = [georeferenced(h.label, h.file.tags) for h in (before, after)]
-    if blocks[0] is None or blocks[1] is None:
-        return Given(None)
-    return Georeferenced(blocks[0], blocks[1], crs)
+    return Fitted(known.covariance, known.shift.centre, known.left_by(applied), (given or 0.0) if known.free else 0.0)
+
+
+def _prior(models: tuple[Heights, Heights], crs: str) -> Georeferenced | None:
+    before, after = (georeferenced(h.label, h.file.tags) for h in models)
+    return None if before is None or after is None else Georeferenced(before, after, crs)
 
 
 def _standardised(ground: Stable, shift: Shift, steps: tuple[float, float]) -> Variogram | None:
@@ -70,23 +110,6 @@ def _standardised(ground: Stable, shift: Shift, steps: tuple[float, float]) -> V
     if ground.sigma is None or not (ground.sigma > 0).all():
         return None
     cells = ground.patches or ground
-    residual = cells.change - shift.at(cells.x, cells.y)
+    residual = cells.change - shift.at(cells.x, cells.y, cells.height)
     assert cells.sigma is not None
     return fit_variogram(cells.row, cells.column, residual / cells.sigma, steps)
-
-
-def _of_fit(shift: Shift, ground: Stable, variogram: Variogram) -> Fitted:
-    # The cells come in random order, so the first are a random sample.
-    some = slice(0, SAMPLE)
-    x, y = ground.x[some], ground.y[some]
-    design = np.ones((len(x), 1)) if len(shift.coefficients) == 1 else plane_design(x, y, shift.centre)
-    assert ground.sigma is not None
-    variance = float(np.mean(ground.sigma**2))
-    covariance = fit_covariance(
-        design,
-        np.column_stack([x, y]),
-        variogram.nugget * variance,
-        tuple((sill * variance, reach) for sill, reach in variogram.structures),
-        ground.count,
-    )
-    return Fitted(covariance, shift.centre)

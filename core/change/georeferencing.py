@@ -1,4 +1,4 @@
-"""What two DSMs say in their tags about the georeferencing of their surveys."""
+"""What two DSMs say in their tags about the georeferencing of their surveys: how far one may stand off the other in height."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..contract import decode
 from ..errors import InputError
 from ..frames import LocalFrame, transformer
 
+Array = NDArray[np.float64]
+_FAR = 100.0  # metres between the places whose heights' errors tell tilts and scale
 GEOREFERENCING = "STRANDLINE_GEOREFERENCING"  # the tag with which a DSM carries its georeferencing's covariance
 
 
@@ -30,12 +33,12 @@ class Georeferenced:
     after: _Block
     crs: str  # that of x and y
 
-    def sigma(self, x: float, y: float, before: float, after: float) -> float | None:
-        """Return the propagated sigma of both shifts, tilts and scales at the zone's mean place."""
-        variance = sum(
-            _height_variance(block, self.crs, x, y, height) for block, height in ((self.before, before), (self.after, after))
-        )
-        return float(np.sqrt(variance))
+    def covariance(self, centre: tuple[float, ...]) -> Array:
+        """Return the covariance (4, 4) of the difference's level (m), tilts east and north, and scale about ``centre`` (x, y, z).
+
+        Flights that share control points err more alike than the sum of both covariances says.
+        """
+        return _height_covariance(self.before, self.crs, centre) + _height_covariance(self.after, self.crs, centre)
 
 
 def georeferenced(label: str, tags: dict[str, str]) -> _Block | None:
@@ -89,10 +92,13 @@ def _damaged(label: str, why: object) -> InputError:
     return InputError(f"{label}: the tag {GEOREFERENCING} is damaged ({why}): export the DSM again.")
 
 
-def _height_variance(block: _Block, crs: str, x: float, y: float, height: float) -> float:
-    x, y = transformer(crs, block.frame.crs).transform(x, y)
-    local = block.frame.from_crs(np.array([[x, y, height]]))[0]
-    east, north, up = local - np.asarray(block.pivot)
+def _height_covariance(block: _Block, crs: str, centre: tuple[float, ...]) -> Array:
+    """Return the covariance (4, 4) of the height's error at ``centre`` and its slopes east, north and up."""
+    places = np.asarray(centre) + _FAR * np.vstack([np.zeros(3), np.eye(3)])
+    x, y = transformer(crs, block.frame.crs).transform(places[:, 0], places[:, 1])
+    east, north, up = (block.frame.from_crs(np.column_stack([x, y, places[:, 2]])) - np.asarray(block.pivot)).T
     # Shift up; a rotation w moves a point by w x r, whose upward part is w_E r_N - w_N r_E; scale lifts by r_U.
-    g = np.array([0.0, 0.0, 1.0, north, -east, 0.0, up])
-    return float(max(0.0, g @ np.reshape(block.covariance, (7, 7)) @ g))
+    zero = np.zeros(4)
+    errors = np.column_stack([zero, zero, zero + 1.0, north, -east, zero, up])
+    slopes = np.vstack([errors[0], (errors[1:] - errors[0]) / _FAR])
+    return np.asarray(slopes @ np.reshape(block.covariance, (7, 7)) @ slopes.T)

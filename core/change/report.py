@@ -13,6 +13,7 @@ from ..raster import Grid
 from ..report.html import Report, new_figure
 from .coregistration import Shift, Statistics
 from .difference import Outcome
+from .heighterror import HeightError
 from .heights import Heights
 from .significance import coverage_factor
 from .uncertainty import ErrorModel
@@ -37,6 +38,7 @@ class Findings:
     confidence: float
     method: str
     shift: Shift
+    known: HeightError | None
     stable: tuple[Statistics, Statistics] | None
     model: ErrorModel
     variogram: Variogram | None
@@ -147,6 +149,8 @@ def _volumes(report: Report, f: Findings) -> None:
 def _stable(report: Report, f: Findings) -> None:
     report.heading("Co-registration and stable ground")
     report.text(f"Taken off the difference: {f.shift.method}, {f.shift.describe()}.")
+    if f.known is not None and f.known.covariance is not None:
+        _known(report, f.known)
     if f.stable is None:
         report.text("No stable ground was given.")
         return
@@ -159,6 +163,30 @@ def _stable(report: Report, f: Findings) -> None:
     )
     if f.variogram is not None and f.variogram.lags:
         report.figure(_variogram(f.variogram), "Variogram of the standardised change on stable ground.")
+
+
+def _known(report: Report, known: HeightError) -> None:
+    rows: list[list[object]] = []
+    if known.prior is not None:
+        rows.append(["the georeferencings (expected, sigma)", *_pairs((0.0,) * 4, known.prior)])
+    if known.stable is not None:
+        rows.append(["stable ground (fitted, sigma)", *_pairs(known.stable[0].coefficients, known.stable[1])])
+    if known.covariance is not None:
+        rows.append(["taken as known (expected, sigma)", *_pairs(known.shift.coefficients, known.covariance)])
+    names = ("level (mm)", "tilt to the east (mm/m)", "tilt to the north (mm/m)", "height's scale (mm/m)")
+    report.table(["error of AFTER against BEFORE", *names], rows)
+    report.text(
+        "What is taken as known joins both by generalised least squares; its covariance, and what was not taken off, make the "
+        "systematic part. A dash: not known, and not counted."
+    )
+
+
+def _pairs(values: tuple[float, ...], covariance: Array) -> list[str | None]:
+    """Return four texts "value +- sigma" in mm; a sigma of 0 is that of a tilt which nothing observes."""
+    told: list[str | None] = [
+        f"{1e3 * value:+.3g} +- {1e3 * sigma:.2g}" for value, sigma in zip(values, np.sqrt(np.diag(covariance)), strict=True)
+    ]
+    return told + [None] * (4 - len(told))
 
 
 def _map(f: Findings) -> Any:

@@ -50,15 +50,22 @@ class Given:
 
 @dataclass(frozen=True)
 class Fitted:
-    """What a shift, or a plane about ``centre``, fitted on stable ground leaves: its covariance (1x1 or 3x3)."""
+    """What is not known of a level, plane or combined surface about ``centre``: covariance (p, p), p 1, 3 or 4 as in ``Shift``.
+
+    ``left`` (p,) is what is known to remain in the difference because another correction was asked for; ``beside`` (m) is an
+    error of all cells that the covariance does not hold.
+    """
 
     covariance: Array
-    centre: tuple[float, float]
+    centre: tuple[float, ...]
+    left: tuple[float, ...] = ()
+    beside: float = 0.0
 
     def sigma(self, x: float, y: float, before: float, after: float) -> float | None:
-        """Return sqrt(g' Cov g) with g = 1 or (1, x, y)."""
-        g = np.array([1.0, x - self.centre[0], y - self.centre[1]])[: len(self.covariance)]
-        return float(np.sqrt(max(0.0, g @ self.covariance @ g)))
+        """Return sqrt(g' Cov g + (g' left)^2 + beside^2) with g = 1, x - x0, y - y0, height before - z0."""
+        g = np.array([1.0, *(np.array([x, y, before])[: len(self.centre)] - self.centre)])[: len(self.covariance)]
+        known = float(g @ self.left) if self.left else 0.0
+        return float(np.sqrt(max(0.0, g @ self.covariance @ g) + known**2 + self.beside**2))
 
 
 def correlated_variance(sample: Array, count: int, squares: float, reach: float) -> float:

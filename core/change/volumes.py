@@ -13,6 +13,8 @@ from .sampling import Sample, mixed
 from .uncertainty import SAMPLE, ErrorModel, Systematic, correlated_variance, total
 
 Array = NDArray[np.float64]
+_LACKING = 0.05  # share of a zone's cells that may lack a precision
+_CAREFUL = 0.95  # quantile of the zone's precision that they get
 _HALF_NORMAL = 1.0 / np.sqrt(2.0 * np.pi)  # mean of max(0, noise) in sigmas
 
 
@@ -68,21 +70,26 @@ class Volume:
 
 
 class _Sum:
-    """Volume and sigma sums over some of a zone's cells, in cells and metres."""
+    """Volume and sigma sums over some of a zone's cells, in cells and metres; ``lacking`` is the weight without a sigma."""
 
     def __init__(self) -> None:
-        self.height, self.weight, self.squares = 0.0, 0.0, 0.0
+        self.height, self.weight, self.lacking, self.sigmas, self.squares = 0.0, 0.0, 0.0, 0.0, 0.0
         self.sample = Sample(SAMPLE, 3)
 
-    def parts(self, cell_area: float, known: bool, model: ErrorModel, shift_sigma: float | None) -> Parts:
-        """Return the three sigmas of this sum."""
+    def parts(self, cell_area: float, fill: float | None, model: ErrorModel, shift_sigma: float | None) -> Parts:
+        """Return the three sigmas of this sum; a cell that lacks a sigma has ``fill`` (m), None: nothing is known."""
         random = correlated = None
-        if known and model.random is not None:
-            random = cell_area * model.random * float(np.sqrt(self.squares))
-        if known and model.structures is not None:
-            sample, count = self.sample.values, self.sample.count
-            variance = sum(f * f * correlated_variance(sample, count, self.squares, reach) for f, reach in model.structures)
-            correlated = cell_area * float(np.sqrt(variance))
+        if fill is not None:
+            squares = self.squares + self.lacking * fill**2
+            if model.random is not None:
+                random = cell_area * model.random * float(np.sqrt(squares))
+            if model.structures is not None:
+                sample, count = self.sample.values, self.sample.count
+                # The cells that lack one lie among the others, with which they err.
+                lift = 1.0 + self.lacking * fill / self.sigmas if self.sigmas > 0 else 1.0
+                known = (f * f * correlated_variance(sample, count, self.squares, reach) for f, reach in model.structures)
+                alone = (f * f * self.lacking * fill**2 for f, _ in model.structures)
+                correlated = cell_area * float(np.sqrt(lift**2 * sum(known) + sum(alone)))
         systematic = None if shift_sigma is None else cell_area * self.weight * shift_sigma
         return Parts(random, correlated, systematic)
 
@@ -96,7 +103,7 @@ class Tally:
         self._significant_down = self._significant_up = 0.0
         self._noise = 0.0
         self._place = np.zeros(3)  # share-weighted sums of x, y, height before
-        self._sigma_known = self._detected = True
+        self._detected = True
         self._cell_area = 0.0
 
     def add(self, tile: Cells, row: int, column: int, shares: Array) -> None:
@@ -109,7 +116,7 @@ class Tally:
         kept = np.zeros(change.shape, np.bool_) if tile.significant is None else tile.significant[part]
         groups = (self._net, self._down, self._up)
         limits = np.array([group.sample.limit for group in groups], np.uint64)
-        sums, others = np.zeros((3, 4)), np.zeros(7)
+        sums, others = np.zeros((3, 6)), np.zeros(7)
         picked = np.zeros(change.shape, np.uint8)
         first = tile.first + row * tile.stride + column
         _gather(change, sigma, kept, before, shares, first, tile.stride, limits, sums, others, picked)
@@ -120,15 +127,28 @@ class Tally:
         self._significant_up += up
         self._noise += _HALF_NORMAL * noise
         if sums[0, 1] > 0:
-            self._sigma_known &= bool(np.isfinite(sums[0, 2]))
             self._detected &= tile.significant is not None
-        for bit, (group, (metres, share, squares, count)) in enumerate(zip(groups, sums.tolist(), strict=True)):
+        for bit, (group, (metres, share, squares, count, lacking, sigmas)) in enumerate(zip(groups, sums.tolist(), strict=True)):
             group.height += metres
             group.weight += share
             group.squares += squares
+            group.lacking += lacking
+            group.sigmas += sigmas
             r, c = np.nonzero(picked & (1 << bit))
             x, y = grid.centres(r + row, c + column)
             group.sample.add(first + r * tile.stride + c, x, y, shares[r, c] * sigma[r, c], count=int(count))
+
+    @property
+    def lacking(self) -> float:
+        """The share (0..1) of the covered cells that lack a precision."""
+        return self._net.lacking / self._net.weight if self._net.weight else 0.0
+
+    def _fill(self) -> float | None:
+        """Return the sigma (m) for cells that lack one, None where too many do."""
+        if self._net.lacking == 0.0:
+            return 0.0
+        sample = self._net.sample.values
+        return float(np.quantile(sample[:, 2], _CAREFUL)) if self.lacking < _LACKING and len(sample) else None
 
     def volume(self, model: ErrorModel, systematic: Systematic) -> Volume:
         """Return the zone's volumes."""
@@ -138,20 +158,32 @@ class Tally:
             return Volume(None, unknown, None, unknown, None, unknown, None, None, None, self._area, 0.0)
         x, y, before = self._place / weight
         shift_sigma = systematic.sigma(float(x), float(y), float(before), float(before + self._net.height / weight))
-        known, detected = self._sigma_known, self._detected
+        fill, detected = self._fill(), self._detected
         return Volume(
             net=a * self._net.height,
-            sigma=self._net.parts(a, known, model, shift_sigma),
+            sigma=self._net.parts(a, fill, model, shift_sigma),
             erosion=-a * self._down.height if self._down.height else 0.0,
-            erosion_sigma=self._down.parts(a, known, model, shift_sigma),
+            erosion_sigma=self._down.parts(a, fill, model, shift_sigma),
             deposition=a * self._up.height,
-            deposition_sigma=self._up.parts(a, known, model, shift_sigma),
+            deposition_sigma=self._up.parts(a, fill, model, shift_sigma),
             erosion_significant=a * self._significant_down if detected else None,
             deposition_significant=a * self._significant_up if detected else None,
-            noise=a * self._noise if detected and known else None,
+            noise=a * (self._noise + _HALF_NORMAL * self._net.lacking * fill) if detected and fill is not None else None,
             area=self._area,
             covered_percent=min(100.0, 100.0 * a * weight / self._area),
         )
+
+
+def without_precision(count: int, names: list[str], tallies: list[Tally]) -> str:
+    """Return what ``count`` cells without a precision mean for the zones called ``names``."""
+    told = f"{count} cells have a change but no precision: they are never significant"
+    over = [name for name, tally in zip(names, tallies, strict=False) if tally.lacking >= _LACKING]
+    some = any(0.0 < tally.lacking < _LACKING for tally in tallies)
+    if some:
+        told += f", and in NET_SIGMA they count with a careful precision, the {100 * _CAREFUL:g} % quantile of their zone's"
+    if over:
+        told += f"{';' if some else ', and'} in {', '.join(over)} they are more than {100 * _LACKING:g} %, so no sigma is known"
+    return told + "."
 
 
 @njit(cache=True)  # pragma: no cover
@@ -168,7 +200,9 @@ def _gather(
     others: Array,
     picked: NDArray[np.uint8],
 ) -> None:
-    """Add cells to sums (all, falling, rising; height, weight, squares, count) and mark those that the samples take, a bit each.
+    """Add cells to sums (all, falling, rising) and mark those that the samples take, a bit each.
+
+    Sums: height, weight, squares and count of cells with a sigma, weight of those without one, weighted sigmas.
 
     ``others``: weight, weight by column and by row, height before, significant fall and rise, sigma of what is not significant.
     """
@@ -178,21 +212,22 @@ def _gather(
             if not w > 0.0 or np.isnan(dh):
                 continue
             s = w * sigma[r, c]
+            known = not np.isnan(s)
             hashed = mixed(first + r * stride + c)
             side = 1 if dh < 0 else 2 if dh > 0 else 0
-            sums[0, 0] += w * dh
-            sums[0, 1] += w
-            sums[0, 2] += s * s
-            sums[0, 3] += 1.0
-            if hashed < limits[0]:
-                picked[r, c] |= 1
-            if side:
-                sums[side, 0] += w * dh
-                sums[side, 1] += w
-                sums[side, 2] += s * s
-                sums[side, 3] += 1.0
-                if hashed < limits[side]:
-                    picked[r, c] |= 1 << side
+            for k in (0, side):
+                sums[k, 0] += w * dh
+                sums[k, 1] += w
+                if not known:
+                    sums[k, 4] += w
+                else:
+                    sums[k, 2] += s * s
+                    sums[k, 3] += 1.0
+                    sums[k, 5] += s
+                    if hashed < limits[k]:
+                        picked[r, c] |= 1 << k
+                if side == 0:
+                    break
             others[0] += w
             others[1] += w * c
             others[2] += w * r
@@ -200,5 +235,5 @@ def _gather(
             if kept[r, c]:
                 others[4] += w * max(-dh, 0.0)
                 others[5] += w * max(dh, 0.0)
-            else:
+            elif known:
                 others[6] += s

@@ -179,7 +179,32 @@ class TestPrecision:
         # 1.96 x 0.1 < 0.5 < 1.96 x 0.4; one cell has no precision.
         assert result.deposition_significant == pytest.approx(39 * 0.5)
         assert any("1 cells have a change but no precision" in w for w in listener.warnings)
-        assert result.net_random is None
+        # The 95 % quantile of the other cells' precision stands in for one cell of 80.
+        assert result.net_random == pytest.approx(np.sqrt(39 * 0.01 + 40 * 0.16 + 0.16))
+
+    def test_too_many_cells_without_precision(self, step, scene, make_raster, listener):
+        pair, options = scene
+        precision = np.full((8, 10), 0.1)
+        precision[0, :3] = np.nan
+        options |= {"correlation_range": 0.0, "registration_sigma": 0.0}
+        some = step(*pair, **{**options, "after_precision": make_raster("some", precision, nodata=np.nan)})
+        # 3 of 80 cells are below 5 %, 4 of 80 are not; all have one precision, so the quantile is it.
+        assert some.net_random == pytest.approx(np.sqrt(80) * 0.1)
+        assert some.net_sigma == pytest.approx(np.sqrt(80) * 0.1)
+        assert "95 % quantile" in listener.warnings[-1]
+        precision[0, 3] = np.nan
+        many = step(*pair, **{**options, "after_precision": make_raster("many", precision, nodata=np.nan)})
+        assert (many.net_random, many.net_correlated, many.net_sigma) == (None, None, None)
+        assert "overlap they are more than 5 %" in listener.warnings[-1]
+
+    def test_cells_without_precision_err_with_the_others(self, step, scene, make_raster):
+        """All cells alike over a kilometre: 3 of 80 without a precision weigh as much as any other."""
+        pair, options = scene
+        precision = np.full((8, 10), 0.1)
+        precision[0, :3] = np.nan
+        after_precision = make_raster("some", precision, nodata=np.nan)
+        result = step(*pair, **{**options, "after_precision": after_precision, "correlation_range": 1e6})
+        assert result.net_correlated == pytest.approx(80 * 0.1, rel=1e-3)
 
     def test_uniform(self, step, scene):
         pair, options = scene

@@ -1,0 +1,255 @@
+"""How one model errs against the other in height: level, tilts and scale, from stable ground and from both georeferencings.
+
+The error of the difference is modelled as a0 + aE (x - x0) + aN (y - y0) + aS (z - z0). The georeferencings give its prior
+covariance. Stable ground observes level and tilts by a robust plane, whose covariance follows from the variogram of what
+is left. Generalised least squares joins both (Tarantola 2005, chapter 3): where stable ground tells nothing the prior stands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.special import chdtrc, fdtrc
+
+from ..progress import Progress
+from .coregistration import Shift, nmad, plane_design, robust_fit
+from .difference import Stable
+from .georeferencing import Georeferenced
+from .uncertainty import SAMPLE, fit_covariance
+from .variogram import Variogram, fit_variogram
+from .zones import Zone
+
+Array = NDArray[np.float64]
+_THIN = 0.02  # share of its length that stable ground must be wide to carry a tilt across
+_CHANCE = 0.001  # without georeferencings, a tilt is taken off when chance, which a fitted plane flatters, shows one more rarely
+_CONFLICT = 0.001  # stable ground and georeferencings contradict each other when chance would part them so more rarely
+_EXACT = 1e-12  # m2; noise is not less, so that models without any can be compared too
+_FREE = 2.0  # a tilt that may be this many times the level's sigma at a zone is one that stable ground does not know
+
+
+@dataclass(frozen=True)
+class HeightError:
+    """Expected error and covariance (p, p) about ``shift.centre``; p is 1 (level), 3 (plane) or 4 (with the scale of heights).
+
+    ``stable`` is the plane of stable ground with its covariance (3, 3), ``prior`` the georeferencings' covariance (4, 4).
+    ``covariance`` is None when it is not known. ``free`` says that a tilt is neither known nor in the covariance.
+    """
+
+    shift: Shift
+    covariance: Array | None
+    stable: tuple[Shift, Array] | None = None
+    prior: Array | None = None
+    free: bool = False
+
+    def left_by(self, applied: Shift) -> tuple[float, ...]:
+        """Return the coefficients (p,) of what is expected to remain when ``applied`` is taken off; none for its own shift."""
+        expected, centre = self.shift.coefficients, self.shift.centre
+        if applied == self.shift or len(expected) == 1:
+            return ()  # a level of stable ground is the median, which is what is taken off
+        x, y = np.array(centre[0]), np.array(centre[1])
+        done = [float(applied.at(x, y)), *applied.coefficients[1:]]
+        return tuple(e - d for e, d in zip(expected, done + [0.0] * (len(expected) - len(done)), strict=True))
+
+    def exceeded_by(self, applied: Shift) -> bool:
+        """Tell whether ``applied`` leaves more in the difference than what is not known explains."""
+        left = np.array(self.left_by(applied))
+        if self.covariance is None or not len(left):
+            return False
+        return bool(chdtrc(len(left), left @ np.linalg.pinv(self.covariance) @ left) < _CONFLICT)
+
+
+@dataclass(frozen=True)
+class _Observation:
+    """``values`` (r,) = ``design`` (r, 4) times the error's coefficients plus noise of ``covariance`` (r, r).
+
+    ``basis`` (3, r) makes level and tilts of the values; ``samples`` is the effective number of independent cells.
+    """
+
+    values: Array
+    covariance: Array
+    basis: Array
+    design: Array
+    samples: float
+
+
+def from_georeferencing(prior: Georeferenced, centre: tuple[float, ...]) -> HeightError:
+    """Return what the tags alone tell: no expected error, and the sum of both covariances."""
+    covariance = prior.covariance(centre)
+    return HeightError(Shift("combined", (0.0,) * 4, centre), covariance, prior=covariance)
+
+
+def from_both(ground: Stable, prior: Georeferenced, steps: tuple[float, float], progress: Progress) -> HeightError:
+    """Return the generalised least squares of stable ground and both georeferencings."""
+    centre = _centre(ground)
+    first = _observe(ground, centre, None, steps)
+    covariance = prior.covariance(centre)
+    spread = first.design @ covariance @ first.design.T + first.covariance
+    misfit = float(first.values @ np.linalg.solve(spread, first.values))
+    if chdtrc(len(first.values), misfit) < _CONFLICT:
+        factor = misfit / len(first.values)
+        covariance = covariance * factor
+        progress.warn(
+            f"STABLE contradicts the two georeferencings (it shows {np.sqrt(factor):.1f} times the error that they allow): their "
+            "sigmas are enlarged by that; check that STABLE has not moved, and the control points."
+        )
+    mean, _ = _joined(first, covariance)
+    # What the plane swallowed of the correlated noise shows in the residuals of the expected error.
+    second = _observe(ground, centre, Shift("combined", tuple(mean.tolist()), centre), steps)
+    mean, posterior = _joined(second, covariance)
+    return HeightError(Shift("combined", tuple(mean.tolist()), centre), posterior, _plane(second, centre), covariance)
+
+
+def from_stable(ground: Stable, level: Shift, zones: list[Zone], steps: tuple[float, float], progress: Progress) -> HeightError:
+    """Return what stable ground alone tells: a plane when its tilt is significant, else the ``level`` fitted to it.
+
+    The test is Fisher's, with the effective number of cells. A tilt that is not seen is left out of the covariance: where stable
+    ground could not see one that matters in the ``zones``, ``free`` says so.
+    """
+    centre = _centre(ground)
+    seen = _observe(ground, centre, None, steps)
+    tilts = len(seen.values) - 1
+    left = seen.samples - 1.0 - tilts
+    if tilts and left > 0:
+        ratio = float(seen.values[1:] @ np.linalg.solve(seen.covariance[1:, 1:], seen.values[1:])) / tilts
+        if fdtrc(tilts, left, ratio) < _CHANCE:
+            plane, covariance = _plane(seen, centre)
+            told = f"STABLE shows a tilt between the models that chance does not explain ({plane.describe()})"
+            progress.info(f"{told}.")
+            if tilts == 2:
+                return HeightError(plane, covariance, (plane, covariance))
+            progress.warn(f"{told}, but lies on one line: the tilt across it is not known, and NET_SIGMA leaves it out.")
+            return HeightError(plane, covariance, (plane, covariance), free=True)
+    variogram = _variogram(ground, level, steps)
+    if variogram is None:
+        return HeightError(level, None, free=True)
+    error = HeightError(level, _covariance(ground, np.ones((len(ground.x), 1)), variogram), _plane(seen, centre))
+    axis = _unseen(seen, centre, zones)
+    if axis is None:
+        return error
+    progress.warn(
+        f"STABLE does not reach far enough {axis} to tell a tilt of one model against the other in that direction: that tilt is "
+        "not known and NET_SIGMA leaves it out unless REGISTRATION_SIGMA is given; add stable ground there."
+    )
+    return HeightError(level, error.covariance, error.stable, free=True)
+
+
+def from_plane(ground: Stable, plane: Shift, steps: tuple[float, float]) -> HeightError:
+    """Return the ``plane`` fitted to stable ground as what is expected, whether its tilt is significant or not."""
+    seen = _observe(ground, _centre(ground), None, steps)
+    if len(seen.values) < 3:
+        return HeightError(plane, None)
+    covariance = _plane(seen, plane.centre)[1]
+    return HeightError(plane, covariance, (plane, covariance))
+
+
+def _joined(seen: _Observation, prior: Array) -> tuple[Array, Array]:
+    """Return the mean (4,) and covariance (4, 4) after the observation."""
+    spread = seen.design @ prior @ seen.design.T + seen.covariance
+    gain = np.linalg.solve(spread, seen.design @ prior).T
+    rest = np.eye(4) - gain @ seen.design
+    # Joseph's form stays symmetric and positive.
+    return gain @ seen.values, rest @ prior @ rest.T + gain @ seen.covariance @ gain.T
+
+
+def _observe(ground: Stable, centre: tuple[float, ...], expected: Shift | None, steps: tuple[float, float]) -> _Observation:
+    """Fit a plane as far as stable ground carries one; noise is what it leaves, or what the ``expected`` error leaves."""
+    design = plane_design(ground.x, ground.y, centre)
+    basis = _basis(design, min(steps))
+    values = robust_fit(design @ basis, ground.change)
+    level, east, north = (basis @ values).tolist()
+    residual = Shift("plane", (level, east, north), centre) if expected is None else expected
+    variogram = _variogram(ground, residual, steps)
+    if variogram is None:
+        # Too few cells to tell noise from what they share: they count as one, and carry no tilt.
+        basis, values = basis[:, :1], np.array([float(np.median(ground.change))])
+        noise = nmad(ground.change) ** 2
+        variogram = Variogram(0.0, ((max(noise, _EXACT), np.inf),))
+        covariance, samples = np.array([[variogram.sill]]), 1.0
+    else:
+        covariance = _covariance(ground, design @ basis, variogram)
+        samples = _variance(ground, variogram) / covariance[0, 0]
+    lift = np.column_stack([design, ground.height - centre[2]])
+    alias = np.linalg.lstsq(design @ basis, lift, rcond=None)[0]
+    return _Observation(values, covariance, basis, np.asarray(alias), samples)
+
+
+def _basis(design: Array, step: float) -> Array:
+    """Return level and the tilts (3, r) along the principal axes of stable ground, the longer first, that it can carry."""
+    lengths, axes = np.linalg.eigh(design[:, 1:].T @ design[:, 1:] / len(design))
+    extent = np.sqrt(np.maximum(lengths, 0.0))
+    kept = [i for i in (1, 0) if extent[i] > max(step, _THIN * extent[1])]
+    basis = np.zeros((3, 1 + len(kept)))
+    basis[0, 0] = 1.0
+    basis[1:, 1:] = axes[:, kept]
+    return basis
+
+
+def _plane(seen: _Observation, centre: tuple[float, ...]) -> tuple[Shift, Array]:
+    level, east, north = (seen.basis @ seen.values).tolist()
+    return Shift("plane", (level, east, north), centre[:2]), np.asarray(seen.basis @ seen.covariance @ seen.basis.T)
+
+
+def _unseen(seen: _Observation, centre: tuple[float, ...], zones: list[Zone]) -> str | None:
+    """Return in which direction a tilt that stable ground cannot tell would matter at a zone, None when in none."""
+    offsets = shapely.get_coordinates(shapely.centroid([zone.shape for zone in zones])) - centre[:2]
+    known = dict(enumerate(np.sqrt(np.diag(seen.covariance))[1:].tolist()))
+    axes = seen.basis[1:, 1:].T
+    if len(axes) == 1:
+        axes = np.vstack([axes, [-axes[0, 1], axes[0, 0]]])
+    elif len(axes) == 0:
+        axes = np.eye(2)
+    level = float(np.sqrt(seen.covariance[0, 0]))
+    for i in (1, 0):  # the shorter axis is the likelier one
+        reach = float(np.abs(offsets @ axes[i]).max())
+        if known.get(i, np.inf) * reach > _FREE * level:
+            return _direction(axes[i])
+    return None
+
+
+def _direction(axis: Array) -> str:
+    """Return an axis (east, north) as words."""
+    names = ("from west to east", "from south-west to north-east", "from south to north", "from north-west to south-east")
+    return names[round(float(np.degrees(np.arctan2(axis[1], axis[0]))) % 180.0 / 45.0) % 4]
+
+
+def _centre(ground: Stable) -> tuple[float, ...]:
+    return float(ground.x.mean()), float(ground.y.mean()), float(ground.height.mean())
+
+
+def _known_sigma(ground: Stable) -> Array:
+    """Return the cells' sigmas; 1 m for all where they are not known, as only their ratios count."""
+    known = ground.sigma is not None and bool((ground.sigma > 0).all())
+    return ground.sigma if known and ground.sigma is not None else np.ones(len(ground.change))
+
+
+def _variogram(ground: Stable, shift: Shift, steps: tuple[float, float]) -> Variogram | None:
+    """Return the variogram of residual / sigma on stable ground, None where it is too small."""
+    cells = ground.patches or ground
+    residual = cells.change - shift.at(cells.x, cells.y, cells.height)
+    return fit_variogram(cells.row, cells.column, residual / _known_sigma(cells), steps)
+
+
+def _variance(ground: Stable, variogram: Variogram) -> float:
+    return max(_EXACT, float(np.mean(_known_sigma(ground) ** 2)) * (variogram.nugget + variogram.sill))
+
+
+def _covariance(ground: Stable, design: Array, variogram: Variogram) -> Array:
+    """Return the covariance (p, p) of a fit of ``design`` (n, p), whose first column is the level.
+
+    A range that is not resolved lifts all cells alike, or tilts them most when it is as long as stable ground: both are counted.
+    """
+    # The cells come in random order, so the first are a random sample.
+    some = slice(0, SAMPLE)
+    place = np.column_stack([ground.x[some], ground.y[some]])
+    variance = float(np.mean(_known_sigma(ground) ** 2))
+    extent = float(np.hypot(*np.ptp(place, axis=0)))
+    told = tuple((sill * variance, extent if np.isinf(reach) else reach) for sill, reach in variogram.structures)
+    covariance = fit_covariance(design[some], place, max(_EXACT, variogram.nugget * variance), told, ground.count)
+    for sill, reach in variogram.structures:
+        if np.isinf(reach):
+            short = fit_covariance(design[some], place, 0.0, ((sill * variance, extent),), ground.count)
+            covariance[0, 0] += sill * variance - short[0, 0]
+    return covariance
