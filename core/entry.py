@@ -23,6 +23,7 @@ from typing import Any
 
 from .contract import decode, encode
 from .errors import Cancelled, InputError, StrandlineError
+from .files import require_writable
 from .progress import Progress
 from .steps import STEP_IDS, load
 
@@ -73,6 +74,8 @@ def main(arguments: list[str] | None = None) -> int:
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
         request = decode(step.Request, _read(Path(words[1])))
+        if report := getattr(request, "output_html_file", None):
+            require_writable(report, "report")
         result = step.run(request, Progress(lines))
     except StrandlineError as error:
         lines.send(type="error", kind=type(error).__name__, text=str(error))

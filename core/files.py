@@ -73,6 +73,28 @@ def whole(path: Path | str, *, room: int = 0, before: Callable[[], None] | None 
         raise
 
 
+def require_writable(path: Path | str, what: str) -> None:
+    """Refuse, before any work, a file that could not be written; ``what`` names it, such as "raster".
+
+    Raises
+    ------
+    InputError
+        When it is a folder, or nothing can be made in its own, or in the nearest that there is.
+    """
+    target = Path(path)
+    folder = next((f for f in target.absolute().parents if f.exists()), target)
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, "it is a folder")
+        # Tried, because what the rights say is not all there is to it.
+        _claim(folder / f"{PART}{_writer()}-{target.name}", 1)
+    except OSError as error:
+        if error.errno in _FULL:
+            raise _full(target) from error
+        why = error.strerror or str(error)
+        raise InputError(f"The {what} {path} cannot be written ({why}): choose a folder you may write to.") from error
+
+
 def require_room(folder: Path) -> None:
     """Refuse to start where nothing can be written.
 

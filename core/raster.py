@@ -16,6 +16,7 @@ import numpy as np
 import rasterio
 import rasterio.shutil
 from numpy.typing import NDArray
+from rasterio._err import CPLE_BaseError  # what copying raises is of no public class
 from rasterio.crs import CRS
 from rasterio.enums import Resampling
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
@@ -23,7 +24,7 @@ from rasterio.transform import Affine
 from rasterio.windows import Window
 
 from .errors import InputError
-from .files import remove_abandoned, whole
+from .files import remove_abandoned, require_writable, whole
 
 # GDAL would keep 5 % of the machine's memory in blocks, in each process.
 os.environ.setdefault("GDAL_CACHEMAX", "192")
@@ -160,11 +161,7 @@ def check_destination(path: str) -> None:
     target = Path(path)
     if target.suffix.lower() not in (".tif", ".tiff"):
         raise InputError(f"The raster {path} must be a GeoTIFF: give a name that ends in .tif.")
-    folder = target.parent
-    while not folder.exists():
-        folder = folder.parent
-    if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise InputError(f"The raster {path} cannot be written: choose a folder you may write to.")
+    require_writable(path, "raster")
 
 
 class CogWriter:
@@ -251,7 +248,7 @@ class CogWriter:
                 self._whole.__exit__(type(failure), failure, failure.__traceback__)
                 raise
             self._whole.__exit__(kind, error, trace)
-        except RasterioError as failure:
+        except (RasterioError, CPLE_BaseError) as failure:
             raise InputError(f"The raster {self._path} cannot be written ({failure}): is there room on its disk?") from failure
         finally:
             # Only now, so that what stands shows whether the disk was full.

@@ -296,7 +296,9 @@ def verify(path: Path, photograph: Photograph) -> None:
 
 
 def _no_survey(folder: Path | str) -> InputError:
-    return InputError(f"{folder} is not a survey folder (no {_FILE} in it): make one with 'Create survey'.")
+    return InputError(
+        f"{str(folder) or 'SURVEY, which is empty,'} is not a survey folder (no {_FILE} in it): make one with 'Create survey'."
+    )
 
 
 def _is_inside(name: str) -> bool:

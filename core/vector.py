@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from pyproj import CRS
 
 from .contract import VectorSource
 from .errors import InputError
-from .files import remove_abandoned, whole
+from .files import remove_abandoned, require_writable, whole
 from .frames import transformer
 
 
@@ -140,9 +139,7 @@ def check_destination(path: str) -> None:
     target = Path(path)
     if target.suffix.lower() != ".gpkg":
         raise InputError(f"The layer {path} must be a GeoPackage: give a name that ends in .gpkg.")
-    folder = next((f for f in target.absolute().parents if f.exists()), target)
-    if target.is_dir() or not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise InputError(f"The layer {path} cannot be written: choose a folder you may write to.")
+    require_writable(path, "layer")
 
 
 def write_layer(

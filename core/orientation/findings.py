@@ -22,6 +22,7 @@ _WELL_SEEN = 3  # rays of a tie point
 _SAMPLE = 5000  # tie points, enough for a percentile
 _NARROW = np.radians(2.0)
 _LEVELS_DIFFER = 5.0  # m; geoids lie tens of metres from the ellipsoid
+_PLANS_DIFFER = 20.0  # m; no receiver is that wrong on average, but another datum is
 
 
 def verdict(solution: Solution, result: Result) -> str:
@@ -74,7 +75,8 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
     if any(e > max(_EDGE_WARNING * m, matters) for m, e in zip(middle, edge, strict=True)):
         told.append(
             "The georeferencing is weak away from its points: sigma at the edge of the ground that "
-            f"{_WELL_SEEN} photographs see is {_pair(*edge)}, amid the points {_pair(*middle)}; put control near the edges."
+            f"{_WELL_SEEN} photographs see is {_pair(*edge)}, amid the points {_pair(*middle)}; put control near the edges, or "
+            "keep to the ground amid it."
         )
     if solution.height_doubt > 0 and abs(inputs.focal_change) > FOCAL_ASTRAY:
         told.append(
@@ -97,6 +99,9 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
             f"GNSS heights are {-level:+.1f} m off the block's on average: they may be heights of another kind (see "
             "GCP_HEIGHTS, GNSS_HEIGHTS and GEOID)."
         )
+    apart = float(np.hypot(*np.mean(solution.gnss_errors[:, :2], axis=0))) if len(inputs.gnss) else 0.0
+    if apart > _PLANS_DIFFER and solution.based_on != "GNSS":
+        told.append(f"GNSS positions are {apart:.0f} m off the block's in plan: is the CRS of the ground points the right one?")
     if dome is not None and dome.significant:
         told.append(
             f"Height errors form a dome of {dome.amplitude:+.3g} m (sigma {dome.sigma:.2g} m) from the middle to the outermost "

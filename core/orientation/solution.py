@@ -17,6 +17,7 @@ from .similarity import Fit, Similarity
 
 Array = NDArray[np.float64]
 
+_FAR = 1000.0  # m in plan; a wrong CRS, for no receiver errs that much
 FOCAL_ASTRAY = 0.05  # focal lengths in EXIF are good to a few per cent
 
 
@@ -67,7 +68,8 @@ def solve(
     Raises
     ------
     InputError
-        When the solution makes the cameras look up, as mirrored coordinates do, or heights cannot be compared.
+        When the solution makes the cameras look up, as mirrored coordinates do, or puts them far from their positions, or heights
+        cannot be compared.
     NotEnoughData
         When points and positions are too few or on one line.
     """
@@ -89,6 +91,7 @@ def solve(
     blunders += wrong_checks(solver, solved)
     based = "GNSS" if not used.any() else "control and GNSS" if with_gnss else "control"
     gnss_errors = solver.gnss_errors(solved)
+    _near_its_positions(gnss_errors)
     suspicious = wrong_positions(solver, solved) if with_gnss else []
     doubt = 0.0 if used.any() else _height_doubt(block, solved, focal_change)
     errors = solver.errors(solved)
@@ -164,6 +167,15 @@ def _look_down(block: Block, solved: Fit) -> None:
         raise InputError(
             "The coordinates make the cameras look up at the ground from below, as mirrored coordinates do: check that "
             "easting and northing (longitude and latitude) are not swapped."
+        )
+
+
+def _near_its_positions(errors: Array) -> None:
+    apart = float(np.hypot(*np.median(errors[:, :2], axis=0))) if len(errors) else 0.0
+    if apart > _FAR:
+        raise InputError(
+            f"The ground points put the block {apart / 1000:.0f} km from the GNSS positions of its photographs: set the right "
+            "CRS of the ground points, or USE_GNSS to false if it is the positions that are wrong."
         )
 
 

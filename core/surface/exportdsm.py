@@ -29,6 +29,7 @@ from .points import check_points_destination
 
 _VERSION = 2  # of the algorithms; raised when the same request gives another surface
 _SCRATCH = "dense"
+_FINEST = 1e-4  # m
 _RASTERS = ("output", "precision", "correlation", "views", "filled", "ortho")
 _POOL = 4  # tiles from which on a pool of processes is worth its start
 
@@ -157,6 +158,12 @@ def _check(request: Request) -> None:
     for name in ("resolution", "regularity", "fill"):
         if getattr(request, name) < 0:
             raise InputError(f"{name.upper()}={getattr(request, name):g} is negative: give 0 or more.")
+    if 0 < request.resolution < _FINEST:
+        raise InputError(f"RESOLUTION={request.resolution:g} m is finer than any photograph: give metres, or 0 for two pixels.")
+    outputs = [str(Path(path).absolute()) for name in (*_RASTERS, "points") if (path := getattr(request, name))]
+    twice = sorted({path for path in outputs if outputs.count(path) > 1})
+    if twice:
+        raise InputError(f"{twice[0]} is named for two outputs: give each a name of its own.")
 
 
 def _plan(survey: Survey, georef: Georef, request: Request, area: list[Any], scratch: str, progress: Progress) -> Plan:

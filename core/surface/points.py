@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from ..errors import InputError
-from ..files import remove_abandoned, whole
+from ..files import remove_abandoned, require_writable, whole
 from ..raster import Grid
 
 _SCALE = 0.001  # metres
@@ -29,11 +28,7 @@ def check_points_destination(path: str) -> None:
     target = Path(path)
     if target.suffix.lower() not in (".laz", ".las"):
         raise InputError(f"The point cloud {path} must be LAS or LAZ: give a name that ends in .laz.")
-    folder = target.parent
-    while not folder.exists():
-        folder = folder.parent
-    if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise InputError(f"The point cloud {path} cannot be written: choose a folder you may write to.")
+    require_writable(path, "point cloud")
 
 
 class PointWriter:
