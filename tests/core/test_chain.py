@@ -15,8 +15,10 @@ import numpy as np
 import pycolmap
 import pytest
 import rasterio
+import shapely
 from strandline.core.georef import Georef
 from strandline.core.survey import Survey
+from strandline.core.vector import write_layer
 
 STEPS = ("createsurvey", "enhance", "tiepoints", "orient", "georeference", "exportdsm")
 DAY = "2024-03-12"
@@ -322,6 +324,47 @@ def test_a_full_disk_is_one_sentence_and_costs_no_earlier_result(whole, step, ch
     assert {p: p.read_bytes() for p in sorted((folder / "out").iterdir())} == rasters
     done(folder, step, wanted[step])
     assert parts(folder) == []
+
+
+@pytest.mark.parametrize(
+    ("step", "change", "why"),
+    [
+        ("enhance", {"survey": "/nowhere"}, "/nowhere is not a survey folder"),
+        ("georeference", {"gcps": ("gcps.gpkg", "EPSG:32755")}, "km from the GNSS positions"),
+        ("georeference", {"gcps": ("gcps.gpkg", "EPSG:2229")}, "US survey foot"),
+        ("georeference", {"marks": ("unknown.csv", None)}, "the marks name IMG_0001.jpg"),
+        ("georeference", {"output_html_file": "/proc/page.html"}, "The report /proc/page.html cannot be written"),
+        ("exportdsm", {"area": ("away.gpkg", None)}, "AREA lies outside"),
+        ("exportdsm", {"resolution": 1e-300}, "RESOLUTION=1e-300"),
+        ("exportdsm", {"resolution": 1e9}, "leaves only 1 x 1 cells"),
+        ("exportdsm", {"output": "/proc/dsm.tif"}, "The raster /proc/dsm.tif cannot be written"),
+        ("exportdsm", {"precision": "OUTPUT"}, "is named for two outputs"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_writes_nothing(simulation, whole, tmp_path, step, change, why):
+    folder, wanted, _, _ = whole
+    (tmp_path / "unknown.csv").write_text((simulation / DAY / "marks.csv").read_text().replace("20240312", "IMG"))
+    (tmp_path / "gcps.gpkg").write_bytes((simulation / DAY / "gcps.gpkg").read_bytes())
+    away = shapely.multipolygons([shapely.box(5e5, 4.8e6, 5e5 + 9, 4.8e6 + 9)])
+    write_layer(str(tmp_path / "away.gpkg"), "away", "EPSG:32630", {"id": [1]}, [away], "MultiPolygon")
+    request = dict(wanted[step])
+    for key, value in change.items():
+        request[key] = request["output"] if value == "OUTPUT" else value
+        if isinstance(value, tuple):
+            name, crs = value
+            request[key] = {"path": str(tmp_path / name), "layer": name.partition(".")[0], "crs": crs}
+    before = contents(folder)
+    status, line = run(folder, step, request)
+    assert status == 1, line
+    assert why in line["text"]
+    assert line["text"].count(". ") == 0
+    assert contents(folder) == before
+
+
+def contents(folder):
+    """Return size and time of what lies in a folder, but for the requests and the lock."""
+    files = [p for p in folder.rglob("*") if p.is_file() and p.parent != folder and p.name != "survey.lock"]
+    return {p: (p.stat().st_size, p.stat().st_mtime_ns) for p in files}
 
 
 def test_another_enhancement_makes_stale_what_was_built_on_it(whole):

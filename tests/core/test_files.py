@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import time
 
 import pytest
 from strandline.core import files
+from strandline.core.errors import InputError
 
 
 def test_a_file_replaces_and_keeps_its_suffix(tmp_path):
@@ -141,6 +143,52 @@ def test_only_parts_of_this_target_and_of_dead_processes_here_are_abandoned(tmp_
         files.remove_abandoned(tmp_path / "dsm.tif")
         assert sorted(p.name for p in tmp_path.iterdir()) == sorted(kept)
     files.remove_abandoned(tmp_path / "nowhere" / "dsm.tif")
+
+
+def test_what_cannot_be_written_is_refused_before_any_work(tmp_path):
+    files.require_writable(tmp_path / "new" / "deep" / "a.tif", "raster")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "d.tif").mkdir()
+    (tmp_path / "file").touch()
+    for path in (tmp_path / "d.tif", tmp_path / "file" / "a.tif", "/proc/a.tif"):
+        with pytest.raises(InputError, match=f"The raster {path} cannot be written"):
+            files.require_writable(path, "raster")
+
+
+def no_file_beyond(size):
+    return {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))}
+
+
+@pytest.mark.parametrize(
+    ("body", "options"),
+    [("part.write_bytes(bytes(200_000))", ""), ("raise AssertionError('there was no room')", ", room=200_000")],
+)
+def test_a_full_disk_is_told_and_leaves_what_stood(tmp_path, body, options):
+    """No file may grow beyond 100 kB here, which fails as a full disk does."""
+    target = tmp_path / "a.bin"
+    target.write_bytes(b"before")
+    program = (
+        "from strandline.core.errors import InputError\nfrom strandline.core.files import whole\n"
+        f"try:\n    with whole({str(target)!r}{options}) as part:\n        {body}\n"
+        "except InputError as error:\n    print(error)\n"
+    )
+    words = [sys.executable, "-c", program]
+    told = subprocess.run(words, capture_output=True, text=True, check=True, **no_file_beyond(100_000))
+    assert told.stdout == f"{target} cannot be written, for the disk is full: free some space and run the step again.\n"
+    assert target.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_record_is_dropped_before_what_it_tells_of_is_replaced(tmp_path):
+    target, seen = tmp_path / "a", []
+    target.write_text("before")
+    with files.whole(target, before=lambda: seen.append(target.read_text())) as part:
+        part.write_text("after")
+        assert seen == []
+    assert seen == ["before"]
+    with pytest.raises(ZeroDivisionError), files.whole(target, before=lambda: seen.append("dropped")):
+        raise ZeroDivisionError
+    assert seen == ["before"]
 
 
 def test_digests_are_of_content(tmp_path):

@@ -634,6 +634,16 @@ def test_report_is_one_page_with_its_map(tmp_path):
     assert json.loads((tmp_path / "survey" / "georef.json").read_text())["method"] == "similarity"
 
 
+def test_ground_points_of_another_crs_are_far_from_the_photographs(tmp_path):
+    scene = Scene(tmp_path)
+    request = scene.request(gnss=True)
+    wrong = replace(request, gcps=replace(request.gcps, crs="EPSG:32632"))  # the zone next to it
+    with pytest.raises(InputError, match=r"put the block \d+ km from the GNSS positions"):
+        run(wrong)
+    assert Survey.open(tmp_path / "survey").record("georeference") is None
+    assert run(replace(wrong, use_gnss=False)).control_count == 6  # it may be the positions that are wrong
+
+
 # What the analyst is told
 
 
@@ -690,3 +700,9 @@ def test_control_in_one_corner_is_told(tmp_path):
     scene.marks = [m for m in scene.marks if within(np.array(m[2:]))]
     run(scene.request())
     assert "weak away from its points: sigma at the edge of the ground that 3 photographs see" in scene.report()
+
+
+def test_another_datum_is_suspected(tmp_path):
+    scene = Scene(tmp_path, gnss_shift=(90.0, 60.0, 0.0))
+    run(scene.request(gnss=True))
+    assert "GNSS positions are 108 m off the block" in scene.report()
