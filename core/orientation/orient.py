@@ -152,8 +152,7 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
     missing = sorted({p.name for p in survey.photographs} - set(names))
     if missing:
         progress.warn(f"{len(missing)} of {len(survey.photographs)} photographs could not be oriented: {some(missing)}.")
-    survey.forget("orient")
-    with whole(survey.folder / MODEL) as part:
+    with whole(survey.folder / MODEL, before=lambda: survey.forget("orient")) as part:
         part.mkdir()
         model.write(part)
     for text in (doubt := far_off(model, priors, fixed)):

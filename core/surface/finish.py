@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..contract import encode
+from ..errors import NotEnoughData
 from ..progress import Progress
 from ..raster import CogWriter, Grid, Patch
 from .filling import fill, margin
@@ -56,7 +57,13 @@ def finish(
     parameters: dict[str, Any],
     progress: Progress,
 ) -> Summary:
-    """Write the rasters that ``outputs`` names and return the summary; the DSM takes its place last."""
+    """Write the rasters that ``outputs`` names and return the summary; the DSM takes its place last.
+
+    Raises
+    ------
+    NotEnoughData
+        When no cell has a height; then nothing is written.
+    """
     grid, level = plan.grid, plan.levels[-1]
     mosaic = Mosaic(plan.scratch, level)
     most = int(fill_area / grid.cell**2)
@@ -127,6 +134,10 @@ def finish(
             filled_cells += int(filled.sum())
             histogram += np.histogram(sigma[np.isfinite(sigma)], _HISTOGRAM)[0]
             score_sum += float(np.nansum(np.where(valid & ~filled, score, np.nan), dtype=np.float64))
+        if not cells:
+            raise NotEnoughData(
+                "No cell of the area has a height: the photographs agree nowhere in it; check AREA and IGNORE, and the orientation."
+            )
     size = (
         shapely.area(shapely.difference(shapely.union_all(area), shapely.union_all(ignore))) / grid.cell**2 if area else covered
     )

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from strandline.core.block import View
 from strandline.core.camera import Camera
 from strandline.core.contract import VectorSource, encode
-from strandline.core.errors import InputError
+from strandline.core.errors import InputError, NotEnoughData
 from strandline.core.files import file_digest
 from strandline.core.frames import LocalFrame
 from strandline.core.georef import FOLDER, Georef
@@ -441,7 +441,7 @@ def test_area_ignore_and_fill(scene, fresh, tmp_path):
     height = read(result.output)
     with rasterio.open(result.output) as file:
         c, r = np.meshgrid(np.arange(file.width) + 0.5, np.arange(file.height) + 0.5)
-        x, y = file.transform * (c, r)
+        x, y = file.transform.c + file.transform.a * c, file.transform.f + file.transform.e * r
         cell = file.transform.a
     wanted = shapely.contains_xy(area_box, x, y) & ~shapely.contains_xy(hole, x, y)
     assert np.isnan(height[~wanted]).all()
@@ -449,6 +449,13 @@ def test_area_ignore_and_fill(scene, fresh, tmp_path):
     # Cells count by their centres, so the edges of the polygons make up to a cell's width of difference.
     expected = min(100.0, 100 * np.isfinite(height).sum() * cell**2 / (area_box.area - hole.area))
     assert result.coverage_percent == pytest.approx(expected, abs=0.1)
+    # A surface without a single height is none: it is told, and what stood stays.
+    write_layer(str(tmp_path / "all.gpkg"), "all", crs, {}, [area_box.buffer(1)], "Polygon")
+    standing = Path(result.output).read_bytes()
+    with pytest.raises(NotEnoughData, match="No cell of the area has a height"):
+        run(request(fresh, tmp_path / "out", area=area, ignore=VectorSource(str(tmp_path / "all.gpkg"), "all", crs)))
+    assert Path(result.output).read_bytes() == standing
+    assert not list(Path(result.output).parent.glob(".part-*"))
 
 
 @pytest.mark.parametrize(
