@@ -136,7 +136,7 @@ def finish(
             score_sum += float(np.nansum(np.where(valid & ~filled, score, np.nan), dtype=np.float64))
         if not cells:
             raise NotEnoughData(
-                "No cell of the area has a height: the photographs agree nowhere in it; check AREA and IGNORE, and the orientation."
+                "No cell of the area has a height, for photographs agree nowhere in it: check AREA, IGNORE and the orientation."
             )
     size = (
         shapely.area(shapely.difference(shapely.union_all(area), shapely.union_all(ignore))) / grid.cell**2 if area else covered
