@@ -150,9 +150,9 @@ def _stable(report: Report, f: Findings) -> None:
     report.heading("Co-registration and stable ground")
     report.text(f"Taken off the difference: {f.shift.method}, {f.shift.describe()}.")
     report.text(
-        "The systematic part knows of level, tilt and scale. It does not know of a dome, which self-calibrated cameras leave in a "
-        "block (a centimetre or two at its edge is common, and it differs from flight to flight): where zones lie far from STABLE, "
-        "look at the maps for change that rises with the distance from the middle, and put stable ground on all sides."
+        "The systematic part knows of level, tilt and scale. It does not know of a dome, which self-calibrated cameras leave in "
+        "a block (a centimetre or two at its edge is common, and it differs from flight to flight): where zones lie far from "
+        "STABLE, look at the map for change that rises with the distance from the middle, and put stable ground on all sides."
     )
     if f.known is not None and f.known.covariance is not None:
         _known(report, f.known)
