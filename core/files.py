@@ -117,6 +117,12 @@ def write_json(path: Path | str, data: Any) -> None:
         part.write_text(json.dumps(encode(data), indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
+def copy_file(source: Path | str, target: Path | str) -> None:
+    """Copy a file, whole or not at all."""
+    with whole(target) as part:
+        shutil.copyfile(source, part)
+
+
 def remove(path: Path) -> None:
     """Remove a file or folder if it exists."""
     if path.is_dir() and not path.is_symlink():

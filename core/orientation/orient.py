@@ -7,7 +7,6 @@ run that was interrupted is run again and gives the same to the bit.
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ import pycolmap
 
 from ..camera import Camera
 from ..errors import InputError, NotEnoughData
-from ..files import digest, whole
+from ..files import copy_file, digest, whole
 from ..photographs.listing import some
 from ..progress import SILENT, Progress
 from ..survey import Photograph, Survey, held
@@ -99,8 +98,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         if record is not None and stands and (survey.folder / MODEL).is_dir() and survey.report_path("orient").is_file():
             progress.info("The photographs are oriented already under these parameters.")
             if request.output_html_file:
-                with whole(request.output_html_file) as part:
-                    shutil.copyfile(survey.report_path("orient"), part)
+                copy_file(survey.report_path("orient"), request.output_html_file)
             numbers = record.result
         else:
             numbers = _orient(request, survey, known, progress)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..errors import InputError
-from ..files import PART, digest, remove, whole, write_json
+from ..files import PART, copy_file, digest, remove, whole, write_json
 from ..progress import SILENT, Progress
 from ..survey import held
 from .terrain import Beach
@@ -85,8 +85,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     if standing is not None and standing["fingerprint"] == fingerprint and _complete(output, standing["files"]):
         progress.info(f"{output} holds this simulation already: it is kept.")
         if request.output_html_file:
-            with whole(request.output_html_file) as part:
-                part.write_bytes((output / "report" / "simulatesurvey.html").read_bytes())
+            copy_file(output / "report" / "simulatesurvey.html", request.output_html_file)
         return Result(output=request.output, **standing["result"])
 
     from .production import produce  # numba and matplotlib are loaded only when there is work

@@ -12,7 +12,7 @@ import shapely
 
 from ..contract import VectorSource, decode
 from ..errors import InputError, NotEnoughData
-from ..files import digest, remove
+from ..files import copy_file, digest, remove
 from ..georef import FOLDER, Georef
 from ..orientation.sparse import read_block
 from ..parallel import run_calls
@@ -241,7 +241,7 @@ def _standing(survey: Survey, request: Request, fingerprint: str) -> Result | No
         page = survey.report_path("exportdsm")
         if not page.is_file():
             return None
-        Path(request.output_html_file).write_bytes(page.read_bytes())
+        copy_file(page, request.output_html_file)
     recorded = decode(Result, {k: v for k, v in record.result.items() if k != "bytes"})
     unwanted: dict[str, Any] = {name: None for name in (*_RASTERS, "points") if not getattr(request, name)}
     return replace(recorded, **unwanted)
