@@ -28,7 +28,7 @@ lint: setup ## style, types and spelling
 	$(ENGINE)/codespell
 
 bench: setup ## speed and memory, beside a peer in the same run
-	@peer=../shared/peers/dsm_sketch_kernels.py; [ -f $$peer ] || peer=; $(ENGINE)/python tests/benchmarks/bench_surface.py $$peer
+	@peer=../shared/peers/dsm_sketch_kernels.py; [ -f $$peer ] || peer=; NUMBA_NUM_THREADS=1 $(ENGINE)/python tests/benchmarks/bench_surface.py $$peer
 	@$(ENGINE)/python tests/benchmarks/bench_difference.py
 
 strings: ## collect the words to translate into i18n/*.ts
