@@ -19,7 +19,7 @@ from typing import Any
 
 from .contract import decode, encode
 from .errors import InputError
-from .files import file_digest, remove_parts, require_room, write_json
+from .files import remove_parts, require_room, write_json
 
 VERSION = 1
 _FILE = "survey.json"
@@ -281,18 +281,6 @@ def _lock(stream: Any) -> None:
         import fcntl
 
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-def verify(path: Path, photograph: Photograph) -> None:
-    """Check a photograph's content against the survey's digest, where its size alone is not enough.
-
-    Raises
-    ------
-    InputError
-        When the content has changed.
-    """
-    if file_digest(path) != photograph.digest:
-        raise InputError(f"The photograph {path} has changed since the survey was made: run 'Create survey' again.")
 
 
 def _no_survey(folder: Path | str) -> InputError:

@@ -177,15 +177,6 @@ def fit(
     return Fit(similarity, pivot, inverse[:7, :7], factor, estimated, redundancy, residuals, weights, error)
 
 
-def principal_sigmas(points: Array) -> Array:
-    """Return the standard deviations (3,) of points (n, 3) along their principal axes, largest first."""
-    centred = np.asarray(points, float) - np.mean(points, axis=0)
-    sigmas = np.zeros(3)
-    found = np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(centred))
-    sigmas[: len(found)] = found
-    return sigmas
-
-
 def _umeyama(models: Array, grounds: Array, weights: Array | None = None) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
     """Solve many sets (k, n, 3) at once: scales (k,), rotations (k, 3, 3), shifts (k, 3), and which are determined (k,)."""
     count = models.shape[1]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..photographs.reading import decode_pixels
 
 COARSEST = 6  # the strongest reduction: 1 / 2**6
 _DECODER = {0: cv2.IMREAD_COLOR, 1: cv2.IMREAD_REDUCED_COLOR_2, 2: cv2.IMREAD_REDUCED_COLOR_4, 3: cv2.IMREAD_REDUCED_COLOR_8}
@@ -55,8 +56,7 @@ def read_reduced(path: str, level: int) -> NDArray[Any]:
     """
     jpeg = Path(path).suffix.lower() in (".jpg", ".jpeg")
     decoded = min(level, 3) if jpeg else 0
-    flags = _DECODER[decoded] | cv2.IMREAD_IGNORE_ORIENTATION | cv2.IMREAD_ANYDEPTH
-    picture = cv2.imread(path, flags)
+    picture = _reduced_jpeg(path, decoded) if jpeg else _whole(path)
     if picture is None:
         raise InputError(f"The photograph {path} cannot be decoded: put a sound copy in its place, or leave it out.")
     square = 2 ** (level - decoded)
@@ -65,6 +65,19 @@ def read_reduced(path: str, level: int) -> NDArray[Any]:
         picture = cv2.copyMakeBorder(picture, 0, rows - picture.shape[0], 0, columns - picture.shape[1], cv2.BORDER_REPLICATE)
         picture = cv2.resize(picture, (columns // square, rows // square), interpolation=cv2.INTER_AREA)
     return np.ascontiguousarray(picture[:, :, ::-1])
+
+
+def _reduced_jpeg(path: str, decoded: int) -> NDArray[Any] | None:
+    return cv2.imread(path, _DECODER[decoded] | cv2.IMREAD_IGNORE_ORIENTATION | cv2.IMREAD_ANYDEPTH)
+
+
+def _whole(path: str) -> NDArray[Any] | None:
+    """Return the pixels (rows, columns, 3) of a TIFF or PNG as stored, None when they cannot be decoded."""
+    try:
+        pixels = decode_pixels(Path(path).read_bytes())
+    except (OSError, ValueError):
+        return None
+    return np.repeat(pixels[:, :, None], 3, axis=2) if pixels.ndim == 2 else pixels
 
 
 def channel_sum(picture: NDArray[Any]) -> NDArray[Any]:

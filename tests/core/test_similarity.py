@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 from strandline.core.errors import NotEnoughData
-from strandline.core.orientation.similarity import Shared, Similarity, design_matrix, fit, principal_sigmas, umeyama
+from strandline.core.orientation.similarity import Shared, Similarity, design_matrix, fit, umeyama
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # 90 degrees about z: x to y, y to -x
 TRUTH = Similarity(20.0, QUARTER, np.array([100.0, 50.0, 5.0]))
@@ -72,12 +72,6 @@ def test_exact_points_give_the_exact_similarity():
     assert solved.similarity.rotation == pytest.approx(QUARTER, abs=1e-9)
     assert np.abs(solved.residuals).max() < 1e-8
     assert solved.redundancy == 11
-
-
-def test_principal_sigmas_by_hand():
-    assert principal_sigmas(np.array([[3, 0, 0], [-3, 0, 0], [0, 1, 0], [0, -1, 0]])) == pytest.approx(
-        [np.sqrt(4.5), np.sqrt(0.5), 0]
-    )
 
 
 @pytest.mark.parametrize(("scaled", "trust"), [(1.0, True), (180.0, True), (30.0, False)])

@@ -9,7 +9,8 @@ import sys
 import pytest
 from strandline.core.errors import InputError
 from strandline.core.files import PART
-from strandline.core.survey import Photograph, Position, Survey, held, verify
+from strandline.core.photographs.reading import decode_photograph
+from strandline.core.survey import Photograph, Position, Survey, held
 
 
 def photograph(name="a.jpg", content=b"sand", **more):
@@ -121,7 +122,7 @@ def test_photographs_that_went_or_changed_are_named(survey):
     path = survey.path(listed)
     path.write_bytes(b"gone")  # as long as before
     with pytest.raises(InputError, match="a.jpg has changed"):
-        verify(survey.path(listed), listed)
+        decode_photograph(survey.path(listed), listed)
     path.write_bytes(b"longer than before")
     with pytest.raises(InputError, match="a.jpg has changed"):
         survey.path(listed)
