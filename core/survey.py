@@ -43,8 +43,7 @@ class Photograph:
 
     ``camera`` groups photographs that share one interior orientation (maker, model, lens, size, focal length).
     ``focal`` is in pixels, None when the file does not tell. Angles (degrees) are the gimbal's from XMP: yaw
-    clockwise from north, pitch -90 for nadir. ``relative_height`` is metres above take-off. ``decodable`` is
-    False for RAW files that are listed but cannot be read yet.
+    clockwise from north, pitch -90 for nadir. ``relative_height`` is metres above take-off.
     """
 
     name: str
@@ -60,7 +59,6 @@ class Photograph:
     yaw: float | None = None
     pitch: float | None = None
     roll: float | None = None
-    decodable: bool = True
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ class Survey:
             raise InputError(f"{path} is damaged ({error}): run 'Create survey' again.") from error
         if version != VERSION:
             raise InputError(f"{path} is of version {version}, this engine reads {VERSION}: update Strandline.")
-        content = decode(_Content, data)
+        content = decode(_Content, _of_today(data))
         for photograph in content.photographs:
             # A survey may come from a stranger; names become paths of files that steps write.
             if not _is_inside(photograph.name):
@@ -287,6 +285,20 @@ def _no_survey(folder: Path | str) -> InputError:
     return InputError(
         f"{str(folder) or 'SURVEY, which is empty,'} is not a survey folder (no {_FILE} in it): make one with 'Create survey'."
     )
+
+
+def _of_today(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a survey file's data without what earlier engines noted: which photographs they could not decode (RAW).
+
+    With such photographs in it the survey counts as not finished, so that it is made again.
+    """
+    try:
+        photographs = [dict(p) for p in data["photographs"]]
+        decoded = [p.pop("decodable", True) for p in photographs]
+        steps = data["steps"] if all(decoded) else {k: v for k, v in data["steps"].items() if k != "createsurvey"}
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return data  # what is wrong with it is told when it is decoded
+    return {**data, "photographs": photographs, "steps": steps}
 
 
 def _is_inside(name: str) -> bool:

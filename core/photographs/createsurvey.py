@@ -149,9 +149,6 @@ def _notes(inspections: list[Inspection]) -> list[str]:
     """Return what the user should know about the photographs, a sentence each."""
     photographs = [i.photograph for i in inspections]
     notes = []
-    raw = [p.name for p in photographs if not p.decodable]
-    if raw:
-        notes.append(f"{len(raw)} RAW photographs are listed but cannot be decoded yet: {some(raw)}.")
     twins = defaultdict(list)
     for p in photographs:
         twins[p.digest].append(p.name)

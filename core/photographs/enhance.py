@@ -18,7 +18,7 @@ from ..survey import Photograph, Survey, held
 from .enhancement import Contrast, enhance_photograph
 from .enhancereport import write_report
 from .listing import some
-from .reading import channel_sum, decode_photograph
+from .reading import read_channel_sum
 
 _FOLDER = "enhanced"
 _VERSION = 1  # of the algorithms and of the files; raised when the same request gives other pixels
@@ -66,8 +66,8 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     with held(request.survey, "enhance"):
         survey = Survey.open(request.survey)
         survey.require("createsurvey")
-        photographs = [p for p in survey.photographs if p.decodable]
-        _check(request, survey, photographs, progress)
+        photographs = list(survey.photographs)
+        _check(request, photographs)
         folder = survey.folder.absolute() / _FOLDER / _parameters_name(request.method, request.window)
         key = [_VERSION, request.method, _window(request.method, request.window)]
         paths = {p.name: survey.path(p).absolute() for p in photographs}
@@ -129,12 +129,7 @@ def _image_path(folder: Path, photograph: Photograph) -> Path:
     return folder / f"{photograph.name}.tif"
 
 
-def _check(request: Request, survey: Survey, photographs: list[Photograph], progress: Progress) -> None:
-    raw = [p.name for p in survey.photographs if not p.decodable]
-    if not photographs:
-        raise InputError(f"All photographs of {survey.folder} are RAW, which cannot be decoded yet: give JPG, TIFF or PNG.")
-    if raw:
-        progress.warn(f"{len(raw)} RAW photographs are passed over, as they cannot be decoded yet: {some(raw)}.")
+def _check(request: Request, photographs: list[Photograph]) -> None:
     small = [p.name for p in photographs if _window(request.method, request.window) and min(p.width, p.height) < request.window]
     if small:
         raise InputError(f"WINDOW={request.window} is larger than {some(small)}: take a smaller one.")
@@ -142,7 +137,7 @@ def _check(request: Request, survey: Survey, photographs: list[Photograph], prog
 
 def _enhance_file(path: str, photograph: dict[str, Any], image: str, method: Any, window: int, key: str) -> Contrast:
     """Write the enhanced ``image`` of a photograph, with the ``key`` it was made under, and return its contrast."""
-    total = channel_sum(decode_photograph(Path(path), decode(Photograph, photograph)))
+    total = read_channel_sum(Path(path), decode(Photograph, photograph))
     grey, contrast = enhance_photograph(total, method, window)
     note = json.dumps({"key": key, "contrast": encode(contrast)})
     with whole(Path(image)) as part:

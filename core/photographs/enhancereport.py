@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..report.html import Report, new_figure
 from ..survey import Photograph, Survey
 from .enhancement import Contrast, noise_floor
-from .reading import channel_sum, decode_photograph, decode_pixels, mean_level
+from .reading import decode_pixels, mean_level, read_channel_sum
 
 _SHOWN = 3  # photographs with pictures
 _CROP = 480  # pixels at full resolution
@@ -68,7 +68,7 @@ def _numbers(contrast: Contrast) -> tuple[float | None, ...]:
 
 
 def _show(report: Report, survey: Survey, photograph: Photograph, image: Path) -> None:
-    total = channel_sum(decode_photograph(survey.path(photograph), photograph))
+    total = read_channel_sum(survey.path(photograph), photograph)
     before = mean_level(total)
     after = decode_pixels(image.read_bytes())
     report.heading(photograph.name)

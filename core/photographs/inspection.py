@@ -7,9 +7,9 @@ from pathlib import Path
 
 from ..files import bytes_digest
 from ..survey import Photograph
-from .listing import is_raw
 from .metadata import camera_name, focal_pixels, read_metadata
-from .reading import frame_size
+from .raw import decode_raw
+from .reading import frame_size, is_raw
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,12 @@ class Inspection:
 def inspect(path: str, name: str) -> Inspection | str:
     """Return what is in the file ``path`` of the photograph ``name``, or in a few words why it cannot be used.
 
-    A RAW file is not decoded; its size is given as 0 x 0.
+    A RAW file is decoded in full.
     """
     try:
         data = Path(path).read_bytes()
         raw = is_raw(name)
-        if raw and not data:
-            return "empty"
-        width, height = (0, 0) if raw else frame_size(data)
+        width, height = decode_raw(data).pixels.shape[1::-1] if raw else frame_size(data)
     except OSError as error:
         return error.strerror or "unreadable"
     except ValueError as error:
@@ -44,14 +42,13 @@ def inspect(path: str, name: str) -> Inspection | str:
         width=width,
         height=height,
         camera=camera_name(told, width, height),
-        focal=focal_pixels(told, width, height) if not raw else None,
+        focal=focal_pixels(told, width, height),
         time=told.time,
         position=told.position,
         relative_height=told.relative_height,
         yaw=told.yaw,
         pitch=told.pitch,
         roll=told.roll,
-        decodable=not raw,
     )
     differ = None
     if told.exif_height is not None and told.xmp_height is not None:

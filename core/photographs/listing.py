@@ -46,11 +46,6 @@ def list_photographs(images: Path, pattern: str | None, outside: Path) -> list[s
     return names
 
 
-def is_raw(name: str) -> bool:
-    """Tell whether a photograph of this name is a RAW file."""
-    return PurePosixPath(name).suffix.casefold() in RAW
-
-
 def some(names: Iterable[str]) -> str:
     """Return names as one phrase, the first few of many."""
     every = list(names)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import io
 import re
 import struct
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
 import cv2
@@ -21,6 +21,7 @@ from PIL import Image
 from ..errors import InputError
 from ..files import bytes_digest
 from ..survey import Photograph
+from .raw import decode_raw
 
 JPG = frozenset({".jpg", ".jpeg", ".jpe"})
 TIFF = frozenset({".tif", ".tiff"})
@@ -45,25 +46,37 @@ BROKEN: tuple[type[Exception], ...] = (
 )
 
 # In entropy-coded data 0xFF is followed by 0x00, by a restart marker, or by more 0xFF; anything else is a marker.
+# Where power 1 / 2.222 meets the toe of slope 4.5 with the same value and slope.
+_TOE, _OFFSET = 0.01805016, 0.09925781
+
 _MARKER = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
 
 
 @dataclass(frozen=True)
 class ChannelSum:
-    """The sum of a photograph's colour channels, in digital numbers (DN).
+    """The sum of a photograph's colour channels, weight 1 each.
 
-    ``values`` (rows, columns) are uint16 for 8-bit photographs and uint32 for 16-bit ones; ``white`` is the
-    largest value that can occur: ``channels * 255`` or ``channels * 65535``. The sum keeps what an 8-bit luma
-    rounds away: up to log2(3) = 1.6 bits where the three channels see one grey signal, as on sand.
+    ``values`` (rows, columns) are uint16 for 8-bit photographs and uint32 for 16-bit and RAW ones; ``white`` is the
+    largest value that can occur: ``channels * 255`` or ``channels * 65535``. ``step`` is what one digital number (DN) of
+    the file is in ``values``: 1, and for RAW what its levels were scaled by. ``linear`` tells that the values are proportional to
+    light (RAW), not gamma-coded. The sum keeps what an 8-bit luma rounds away: up to log2(3) = 1.6 bits where the
+    three channels see one grey signal, as on sand.
     """
 
     values: NDArray[Any]
     channels: int
     white: int
+    step: float = 1.0
+    linear: bool = False
 
 
-def decode_photograph(path: Path, photograph: Photograph) -> NDArray[Any]:
-    """Return a photograph's pixels, see ``decode_pixels``, after making sure that they are those the survey lists.
+def is_raw(name: str) -> bool:
+    """Tell whether a photograph of this name is a RAW file."""
+    return PurePosixPath(name).suffix.casefold() in RAW
+
+
+def read_channel_sum(path: Path, photograph: Photograph) -> ChannelSum:
+    """Return the sum of a photograph's channels, after making sure that the file is the one the survey lists.
 
     Raises
     ------
@@ -77,7 +90,11 @@ def decode_photograph(path: Path, photograph: Photograph) -> NDArray[Any]:
     if bytes_digest(data) != photograph.digest:
         raise InputError(f"The photograph {path} has changed since the survey was made: run 'Create survey' again.")
     try:
-        return decode_pixels(data)
+        if is_raw(photograph.name):
+            develop = decode_raw(data)
+            total = channel_sum(develop.pixels)
+            return replace(total, step=develop.step, linear=True)
+        return channel_sum(decode_pixels(data))
     except ValueError as error:
         raise InputError(f"The photograph {path} is {error}: copy it again from the camera.") from error
 
@@ -130,9 +147,18 @@ def _add_channels(stack: NDArray[Any], out: NDArray[Any]) -> None:
 
 
 def mean_level(photograph: ChannelSum) -> NDArray[np.uint8]:
-    """Return the mean of the channels at 8 bits (rows, columns), rounded."""
-    table = np.floor(255.0 * np.arange(photograph.white + 1) / photograph.white + 0.5).astype(np.uint8)
+    """Return the mean of the channels at 8 bits (rows, columns), rounded; linear values get the usual gamma curve first."""
+    share = np.arange(photograph.white + 1) / photograph.white
+    table = np.floor(255.0 * (gamma_coded(share) if photograph.linear else share) + 0.5).astype(np.uint8)
     return table[photograph.values]
+
+
+def gamma_coded(light: NDArray[Any]) -> NDArray[np.float64]:
+    """Return light in [0, 1] on the gamma curve of dcraw and BT.709: power 1 / 2.222, slope 4.5 next to black.
+
+    ``4.5 x`` up to where ``1.0993 x^0.45 - 0.0993`` continues it smoothly.
+    """
+    return np.where(light < _TOE, 4.5 * light, (1.0 + _OFFSET) * np.power(light, 1 / 2.222) - _OFFSET)
 
 
 def frame_size(data: bytes) -> tuple[int, int]:

@@ -176,9 +176,6 @@ def _plan(survey: Survey, georef: Georef, request: Request, area: list[Any], scr
     missing = [v.name for v in block.views if v.name not in listed]
     if missing:
         raise InputError(f"{missing[0]} is oriented but not in the survey {survey.folder}: run strandline:orient again.")
-    raw = [v.name for v in block.views if not listed[v.name].decodable]
-    if raw:
-        raise InputError(f"{raw[0]} cannot be decoded yet (RAW): make the survey from its JPG or TIFF.")
     paths = tuple(str(survey.path(listed[v.name])) for v in block.views)
     gsd, base = ground_pixel(block), base_over_height(block)
     resolution = request.resolution or 2.0 * gsd

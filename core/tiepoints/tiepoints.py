@@ -16,7 +16,7 @@ from ..files import digest, file_digest, remove
 from ..parallel import run_calls
 from ..photographs.enhance import enhanced_path
 from ..photographs.listing import some
-from ..photographs.reading import channel_sum, decode_photograph, decode_pixels, mean_level
+from ..photographs.reading import decode_pixels, mean_level, read_channel_sum
 from ..progress import SILENT, Progress
 from ..survey import Photograph, Survey, held
 from . import features, matching
@@ -76,11 +76,9 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     with held(request.survey, "tiepoints"):
         survey = Survey.open(request.survey)
         survey.require("createsurvey")
-        photographs = [p for p in survey.photographs if p.decodable]
+        photographs = survey.photographs
         if len(photographs) < 2:
-            raise NotEnoughData(
-                f"The survey {survey.folder} has {len(photographs)} photograph that can be decoded: tie points need two or more."
-            )
+            raise NotEnoughData(f"The survey {survey.folder} has {len(photographs)} photograph: tie points need two or more.")
         enhanced = _use_enhanced(request, survey, progress)
         images = [enhanced_path(survey, p) if enhanced else survey.path(p) for p in photographs]
         cache = survey.folder.absolute() / CACHE
@@ -176,7 +174,7 @@ def _find_features(image: str, photograph: dict[str, Any] | None, path: str, max
         except ValueError as error:
             raise InputError(f"The enhanced image {image} is {error}: delete it and run strandline:enhance again.") from error
     else:
-        grey = mean_level(channel_sum(decode_photograph(source, decode(Photograph, photograph))))
+        grey = mean_level(read_channel_sum(source, decode(Photograph, photograph)))
     features.write_features(Path(path), features.detect(grey, max_features=max_features, max_size=max_size))
 
 

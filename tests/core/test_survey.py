@@ -9,7 +9,7 @@ import sys
 import pytest
 from strandline.core.errors import InputError
 from strandline.core.files import PART
-from strandline.core.photographs.reading import decode_photograph
+from strandline.core.photographs.reading import read_channel_sum
 from strandline.core.survey import Photograph, Position, Survey, held
 
 
@@ -122,7 +122,7 @@ def test_photographs_that_went_or_changed_are_named(survey):
     path = survey.path(listed)
     path.write_bytes(b"gone")  # as long as before
     with pytest.raises(InputError, match="a.jpg has changed"):
-        decode_photograph(survey.path(listed), listed)
+        read_channel_sum(survey.path(listed), listed)
     path.write_bytes(b"longer than before")
     with pytest.raises(InputError, match="a.jpg has changed"):
         survey.path(listed)
