@@ -9,6 +9,8 @@ import os
 import re
 import shutil
 import socket
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +24,17 @@ _OLD = f"{PART}old-"  # marks a folder that is being replaced
 _SPARE = 1 << 16  # bytes; what libraries wrote without a word on a full disk may be short, so that some must be left
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _SIDECAR = re.compile(r"(\.[\w.]+\.tmp|-journal|-wal|-shm)?")  # what libraries put beside the file they are writing
+
+# Waits until whoever holds the other end of its input is gone; workers may write for a moment longer.
+_REMOVER = """
+import os, shutil, sys, time
+sys.stdin.read()
+for _ in range(100):
+    shutil.rmtree(sys.argv[1], ignore_errors=True)
+    if not os.path.exists(sys.argv[1]):
+        break
+    time.sleep(0.1)
+"""
 
 
 @contextmanager
@@ -71,6 +84,26 @@ def whole(path: Path | str, *, room: int = 0, before: Callable[[], None] | None 
     except BaseException:
         _discard(part)
         raise
+
+
+@contextmanager
+def scratch(path: Path | str) -> Iterator[Path]:
+    """Yield a new folder beside ``path`` for what is not to be kept, and remove it at the end, whatever the end is.
+
+    A process of its own waits for the end of this one, so that the folder goes too when this process is killed. What one that
+    was killed with it has left is removed at the start.
+    """
+    target = Path(path)
+    remove_abandoned(target)
+    part = target.with_name(f"{PART}{_writer()}-{target.name}")
+    part.mkdir(parents=True)
+    nothing = subprocess.DEVNULL
+    command = [sys.executable, "-c", _REMOVER, str(part)]
+    try:
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing, start_new_session=True):
+            yield part
+    finally:
+        _discard(part)
 
 
 def require_writable(path: Path | str, what: str) -> None:

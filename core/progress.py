@@ -37,6 +37,25 @@ class Silent:
         return False
 
 
+class _Prefixed:
+    """A listener that tells its own listener what each sentence is about."""
+
+    def __init__(self, listener: Listener, subject: str) -> None:
+        self._listener, self._subject = listener, subject
+
+    def fraction(self, value: float) -> None:
+        """Pass it on."""
+        self._listener.fraction(value)
+
+    def message(self, text: str, *, warning: bool) -> None:
+        """Pass the sentence on behind its subject."""
+        self._listener.message(f"{self._subject}: {text}", warning=warning)
+
+    def cancelled(self) -> bool:
+        """Pass it on."""
+        return self._listener.cancelled()
+
+
 class Progress:
     """A stretch of a step's progress, mapped to a part of its listener's 0..1."""
 
@@ -59,6 +78,10 @@ class Progress:
         """Return the progress of the part from ``start`` to ``end`` of this one."""
         span = self._end - self._start
         return Progress(self._listener, self._start + span * start, self._start + span * end)
+
+    def about(self, subject: str) -> Progress:
+        """Return this progress with ``subject`` before each of its sentences."""
+        return Progress(_Prefixed(self._listener, subject), self._start, self._end)
 
     def over(self, items: Iterable[T], total: int | None = None) -> Iterator[T]:
         """Yield ``items``, reporting after each; ``total`` is needed when they have no length."""

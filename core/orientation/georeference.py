@@ -101,7 +101,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     NotEnoughData
         When control points and positions do not place the block.
     """
-    _check_parameters(request)
+    check_parameters(request)
     survey = Survey.open(request.survey)
     with held(survey.folder, STEP):
         survey = Survey.open(request.survey)
@@ -149,7 +149,14 @@ def write_transformed(model: pycolmap.Reconstruction, similarity: Similarity, su
         model.write(part)
 
 
-def _check_parameters(request: Request) -> None:
+def check_parameters(request: Request) -> None:
+    """Refuse, before anything is read, parameters that cannot be met.
+
+    Raises
+    ------
+    InputError
+        When there are any.
+    """
     if request.method == "adjustment":
         raise InputError("METHOD=adjustment is not available yet: use METHOD=similarity.")
     if request.gcp_file and (request.gcps or request.marks):

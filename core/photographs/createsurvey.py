@@ -68,9 +68,9 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     crs = projected_crs(request.crs) if request.crs else None
     names = list_photographs(images, (request.filter or "").strip() or None, output)
     table = read_positions(request.positions, request.positions_crs, names) if request.positions else None
-    inspections = _inspect(images, names, progress.part(0.0, 0.9))
+    inspections = inspect_all(images, names, progress.part(0.0, 0.9))
     photographs = [i.photograph for i in inspections]
-    notes = _notes(inspections)
+    notes = notes_on_inspections(inspections)
     if table:
         notes += _notes_on_table(table, photographs)
         photographs = [replace(p, position=table.positions.get(p.name)) for p in photographs]
@@ -125,7 +125,7 @@ def _check_output(output: Path) -> None:
         raise InputError(f"OUTPUT is not empty and no survey: {output} holds {some(sorted(others))}; give a new folder.")
 
 
-def _inspect(images: Path, names: list[str], progress: Progress) -> list[Inspection]:
+def inspect_all(images: Path, names: list[str], progress: Progress) -> list[Inspection]:
     """Return what each photograph tells, in the order of ``names``; all that are broken are named in one sentence."""
     calls = ((str(images / name), name) for name in names)
     workers = 0 if len(names) >= _MANY else 1
@@ -145,7 +145,7 @@ def _inspect(images: Path, names: list[str], progress: Progress) -> list[Inspect
     return inspections
 
 
-def _notes(inspections: list[Inspection]) -> list[str]:
+def notes_on_inspections(inspections: list[Inspection]) -> list[str]:
     """Return what the user should know about the photographs, a sentence each."""
     photographs = [i.photograph for i in inspections]
     notes = []

@@ -14,7 +14,7 @@ from .reading import DECODABLE, RAW
 _SHOWN = 8
 
 
-def list_photographs(images: Path, pattern: str | None, outside: Path) -> list[str]:
+def list_photographs(images: Path, pattern: str | None, outside: Path, kinds: frozenset[str] = DECODABLE | RAW) -> list[str]:
     """Return the names (paths relative to ``images``, with forward slashes) of the photographs in it, sorted.
 
     Parameters
@@ -25,6 +25,8 @@ def list_photographs(images: Path, pattern: str | None, outside: Path) -> list[s
         A glob that the file's name or its relative path must match, upper and lower case alike; None for all.
     outside
         A folder to pass over: the survey's own.
+    kinds
+        The files' endings, in lower case.
 
     Raises
     ------
@@ -35,10 +37,10 @@ def list_photographs(images: Path, pattern: str | None, outside: Path) -> list[s
         raise InputError(f"IMAGES is not a folder: {images}.")
     if (images / "survey.json").is_file():
         raise InputError(f"IMAGES is a survey folder, not a folder of photographs: {images}.")
-    found = sorted(_walk(images, outside.resolve()))
+    found = sorted(_walk(images, outside.resolve(), kinds))
     if not found:
-        kinds = ", ".join(sorted(s[1:] for s in DECODABLE | RAW))
-        raise InputError(f"There is no photograph in {images} (files ending in {kinds}): choose another folder.")
+        endings = ", ".join(sorted(s[1:] for s in kinds))
+        raise InputError(f"There is no photograph in {images} (files ending in {endings}): choose another folder.")
     names = [n for n in found if pattern is None or _matches(n, pattern)]
     if not names:
         raise InputError(f"None of the {len(found)} photographs in {images} matches FILTER={pattern!r}: try '*.jpg'.")
@@ -53,7 +55,7 @@ def some(names: Iterable[str]) -> str:
     return ", ".join(every[:_SHOWN]) + (f" and {rest} more" if rest > 0 else "")
 
 
-def _walk(images: Path, outside: Path) -> Iterator[str]:
+def _walk(images: Path, outside: Path, kinds: frozenset[str]) -> Iterator[str]:
     seen: set[str] = set()  # a link to a folder above would lead round for ever
     for folder, folders, files in os.walk(images, followlinks=True):
         place = Path(folder)
@@ -65,7 +67,7 @@ def _walk(images: Path, outside: Path) -> Iterator[str]:
         folders[:] = [f for f in folders if not f.startswith((".", "$"))]
         for file in files:
             # macOS leaves hidden companions ("._DJI_0001.JPG") on memory cards.
-            if not file.startswith(".") and Path(file).suffix.casefold() in DECODABLE | RAW:
+            if not file.startswith(".") and Path(file).suffix.casefold() in kinds:
                 yield (place / file).relative_to(images).as_posix()
 
 

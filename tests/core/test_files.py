@@ -222,3 +222,20 @@ def test_a_file_that_appears_is_complete(tmp_path):
     assert process.returncode == 0
     assert sizes <= {2_000_000}
     assert len(target.read_bytes()) == 2_000_000
+
+
+def test_a_scratch_folder_goes_with_its_process(tmp_path):
+    with files.scratch(tmp_path / "work") as folder:
+        (folder / "file").write_text("x")
+        assert list(tmp_path.iterdir()) == [folder]
+    assert list(tmp_path.iterdir()) == []
+
+    body = f"from strandline.core.files import scratch\nwith scratch({str(tmp_path / 'work')!r}) as f:\n"
+    body += "    (f / 'file').write_text('x')\n    print(f, flush=True)\n    import time; time.sleep(60)"
+    with subprocess.Popen([sys.executable, "-c", body], stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+        assert os.path.isdir(process.stdout.readline().strip())  # noqa: PTH112
+        os.killpg(process.pid, signal.SIGKILL)
+    deadline = time.monotonic() + 10
+    while list(tmp_path.iterdir()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert list(tmp_path.iterdir()) == []
