@@ -4,6 +4,9 @@ The arctan method follows Rosu, Assenbaum, De la Torre and Pierrot-Deseilligny (
 by the mean and the standard deviation of the square window around it and compressed by an arctangent; the result is mapped
 by one fixed affine function, so that the same ground looks the same in two photographs.
 The ``micmac`` method is what MicMac's "SFS" does: a global tone curve that the local term may shift by at most 64.
+
+Where pixels are masked, sums over the window become sums over its unmasked pixels (normalised convolution), and where those are
+less than a quarter of the window nothing is defined.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -22,6 +26,9 @@ Method = Literal["arctan", "micmac", "equalize", "none"]
 _BINS = 65536  # of MicMac's histograms
 _MARGIN = 64.0  # grey levels by which MicMac's local term may shift the tone
 _EVERY = 16  # the statistics are taken from every 16th row
+_LEAST_SHARE = 0.25  # of a window's pixels that must be unmasked
+_UNDEFINED = 128  # grey level of masked and undefined pixels: flat, so that nothing is found there
+_NO_COUNTS, _NO_PIXELS = np.zeros((0, 0), np.int32), np.zeros((0, 0), np.bool_)
 
 # atan(x) = x * (a0 + a1 x^2 + ... ) on [0, 1], fitted to the least largest error: 2.5e-7 rad, 2e-5 grey levels.
 _A0, _A1, _A2, _A3, _A4, _A5, _A6 = np.array(
@@ -33,24 +40,35 @@ _ONE_BY_HALF_PI = np.float32(2 / math.pi)
 
 @dataclass(frozen=True)
 class Contrast:
-    """What a photograph's pixels told, in DN of the sum of channels, from every 16th row.
+    """What a photograph's unmasked pixels told, in DN of the file for the sum of channels, from every 16th row.
 
-    ``noise`` is the noise of one pixel, finest texture included; ``mean_sigma`` the mean standard deviation in
-    the window; ``below_percent`` the share of pixels where that is under the floor. The last two are None for methods
-    without a window.
+    ``noise`` is the noise of one pixel, finest texture included; ``levels`` the DN per channel from black to white;
+    ``mean_sigma`` the mean standard deviation in the window, ``floor`` the least that is believed, ``below_percent`` the share
+    of pixels where it is less. These three are None for methods without a window. ``masked_percent`` is the share of all pixels
+    that cannot hold key points, None without a mask.
     """
 
     noise: float
+    levels: float
     mean_sigma: float | None = None
+    floor: float | None = None
     below_percent: float | None = None
+    masked_percent: float | None = None
 
 
-def noise_floor(channels: int) -> float:
-    """Return the least sigma of a sum of ``channels`` that is believed: independent channels with 1 DN each."""
-    return math.sqrt(channels)
+def noise_floor(channels: int, step: float = 1.0) -> float:
+    """Return the least sigma of a sum of ``channels`` that is believed: independent channels with 1 DN, ``step``, each."""
+    return math.sqrt(channels) * step
 
 
-def enhance_photograph(photograph: ChannelSum, method: Method, window: int = 101) -> tuple[NDArray[np.uint8], Contrast]:
+def has_window(method: Method) -> bool:
+    """Tell whether a method looks at a window around each pixel."""
+    return method in ("arctan", "micmac")
+
+
+def enhance_photograph(
+    photograph: ChannelSum, method: Method, window: int = 101, valid: NDArray[np.bool_] | None = None
+) -> tuple[NDArray[np.uint8], Contrast]:
     """Return a photograph as 8-bit image (rows, columns) for the detection of key points, and its contrast.
 
     Parameters
@@ -66,28 +84,45 @@ def enhance_photograph(photograph: ChannelSum, method: Method, window: int = 101
         ``none``: the mean of the channels at 8 bits. JPG, TIFF and PNG are gamma-coded already: no curve is applied.
     window
         Side of the square window in pixels, odd.
+    valid
+        False (rows, columns) where pixels are masked: they enter no statistics. They, and those ``usable`` excludes, become 128.
 
     Notes
     -----
     Sums over the window are sums of whole numbers below 2**53 in float64: exact, and the same in any order. The variance
     of 16-bit photographs is good to 1e-5 DN**2.
     """
-    values = photograph.values
-    noise = pixel_noise(values)
-    if method in ("none", "equalize"):
-        grey = mean_level(photograph) if method == "none" else equalized_table(values)[values]
-        return grey, Contrast(noise)
+    values, step = photograph.values, photograph.step
+    noise, levels = pixel_noise(values, valid) / step, photograph.white / photograph.channels / step
+    kept = None if valid is None else usable(valid, method, window)
+    masked = None if kept is None else 100.0 * float(1.0 - kept.mean())
+    if not has_window(method):
+        grey = mean_level(photograph) if method == "none" else equalized_table(values, valid)[values]
+        return _flat(grey, kept), Contrast(noise, levels, masked_percent=masked)
     half = window // 2
+    counts = _NO_COUNTS if valid is None else _window_counts(valid, method, window)
+    present = values if valid is None else np.where(valid, values, values.dtype.type(0))  # adds nothing to the sums
     if method == "micmac":
-        tone, margin = micmac_tables(values)
+        tone, margin = micmac_tables(values, valid)
         rows, columns = (np.clip(np.arange(-half, n + half), 0, n - 1) for n in values.shape)
     else:
         # 0.5 more than the middle, so that the truncation to whole grey levels rounds.
         tone, margin = np.full(1, 128.0, np.float32), np.full(1, 127.5, np.float32)
         rows, columns = (reflected(n, half) for n in values.shape)
     out = np.empty(values.shape, np.uint8)
-    sigma, below, count = _local_contrast(values, rows, columns, noise_floor(photograph.channels), tone, margin, out)
-    return out, Contrast(noise, sigma / count, 100.0 * below / count)
+    floor = noise_floor(photograph.channels, step)
+    sigma, below, count = _local_contrast(
+        present, counts, _NO_PIXELS if kept is None else kept, rows, columns, floor, tone, margin, out
+    )
+    mean_sigma, below_percent = (sigma / count / step, 100.0 * below / count) if count else (None, None)
+    return _flat(out, kept), Contrast(noise, levels, mean_sigma, floor / step, below_percent, masked)
+
+
+def usable(valid: NDArray[np.bool_], method: Method, window: int) -> NDArray[np.bool_]:
+    """Return where key points may lie (rows, columns): unmasked, with a quarter of the window unmasked."""
+    if not has_window(method):
+        return valid
+    return np.asarray(valid & (_window_counts(valid, method, window) >= _LEAST_SHARE * window * window))
 
 
 def reflected(count: int, half: int) -> NDArray[np.int64]:
@@ -96,32 +131,34 @@ def reflected(count: int, half: int) -> NDArray[np.int64]:
     return np.minimum(period, 2 * count - 1 - period)
 
 
-def equalized_table(values: NDArray[Any]) -> NDArray[np.uint8]:
+def equalized_table(values: NDArray[Any], valid: NDArray[np.bool_] | None = None) -> NDArray[np.uint8]:
     """Return the grey level of each sum of channels from 0 to the largest, by the inclusive cumulative histogram."""
-    counts = _histogram(values, int(values.max()) + 1)
-    return np.floor(255.0 * np.cumsum(counts) / values.size + 0.5).astype(np.uint8)
+    counts = _histogram(values, int(values.max()) + 1, _NO_PIXELS if valid is None else valid)
+    return np.floor(255.0 * np.cumsum(counts) / max(counts.sum(), 1) + 0.5).astype(np.uint8)
 
 
-def micmac_tables(values: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return tone and margin (grey levels) of each sum of channels from 0 to the largest, as MicMac's ``PrepSift`` has them.
+def micmac_tables(
+    values: NDArray[Any], valid: NDArray[np.bool_] | None = None
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return tone and margin (grey levels) of each sum of channels, as MicMac's ``PrepSift`` has them.
 
     ``tone = (H + 2 L + 3 S) / 6``: the histogram's cumulative share, the linear scale to the largest value, and
     the cumulative share of the square roots of the histogram's counts, each times 255; ``margin`` is the distance to
-    black or white, 64 at most. 65,536 bins over [0, largest] (MicMac, CPP_Devlop.cpp).
+    black or white, 64 at most. 65,536 bins over [0, largest] (MicMac, CPP_Devlop.cpp). Masked pixels are not counted.
     """
-    largest = int(values.max())
+    largest = int(values.max() if valid is None else values.max(where=valid, initial=0))
     bins = np.arange(largest + 1, dtype=np.int64) * _BINS // (largest + 1)
-    counts = np.bincount(bins, _histogram(values, largest + 1), _BINS)
-    share = np.cumsum(counts) / values.size
+    counts = np.bincount(bins, _histogram(values, largest + 1, _NO_PIXELS if valid is None else valid), _BINS)
+    share = np.cumsum(counts) / max(counts.sum(), 1)
     roots = np.cumsum(np.sqrt(counts))
     linear = np.arange(largest + 1) / max(largest, 1)
-    tone = 255.0 * (share[bins] + 2.0 * linear + 3.0 * (roots / roots[-1])[bins]) / 6.0
+    tone = 255.0 * (share[bins] + 2.0 * linear + 3.0 * (roots / max(roots[-1], 1.0))[bins]) / 6.0
     margin = np.minimum(_MARGIN, np.minimum(tone, 255.0 - tone))
     return tone.astype(np.float32), margin.astype(np.float32)
 
 
-def pixel_noise(values: NDArray[Any]) -> float:
-    """Return the noise of one pixel (DN), from second differences along both axes (Immerkaer 1996), every 16th row.
+def pixel_noise(values: NDArray[Any], valid: NDArray[np.bool_] | None = None) -> float:
+    """Return the noise of one pixel, from second differences along both axes (Immerkaer 1996), every 16th row.
 
     These are blind to planes and edges along the axes; what texture there is at the scale of a pixel counts as noise.
     """
@@ -129,22 +166,43 @@ def pixel_noise(values: NDArray[Any]) -> float:
         return 0.0
     above, middle, below = (values[i : values.shape[0] - 2 + i : _EVERY].astype(float) for i in range(3))
     along = above - 2.0 * middle + below
-    mixed = along[:, :-2] - 2.0 * along[:, 1:-1] + along[:, 2:]
-    return float(math.sqrt(math.pi / 2) / 6.0 * np.abs(mixed).mean())
+    mixed = np.abs(along[:, :-2] - 2.0 * along[:, 1:-1] + along[:, 2:])
+    if valid is not None:
+        whole = cv2.erode(valid.view(np.uint8), np.ones((3, 3), np.uint8))[1:-1:_EVERY, 1:-1].astype(bool)
+        mixed = mixed[whole]
+    return float(math.sqrt(math.pi / 2) / 6.0 * mixed.mean()) if mixed.size else 0.0
+
+
+def _window_counts(valid: NDArray[np.bool_], method: Method, window: int) -> NDArray[np.int32]:
+    """Return how many pixels of each window are unmasked (rows, columns), the border as the method has it."""
+    border = cv2.BORDER_REPLICATE if method == "micmac" else cv2.BORDER_REFLECT
+    pixels = valid.view(np.uint8)
+    return np.asarray(cv2.boxFilter(pixels, cv2.CV_32S, (window, window), normalize=False, borderType=border), np.int32)
+
+
+def _flat(grey: NDArray[np.uint8], kept: NDArray[np.bool_] | None) -> NDArray[np.uint8]:
+    return grey if kept is None else np.where(kept, grey, np.uint8(_UNDEFINED))
 
 
 @njit(cache=True)
-def _histogram(values: NDArray[Any], bins: int) -> NDArray[np.int64]:
+def _histogram(values: NDArray[Any], bins: int, valid: NDArray[np.bool_]) -> NDArray[np.int64]:
     counts = np.zeros(bins, np.int64)
     for r in range(values.shape[0]):
-        for value in values[r]:
-            counts[value] += 1
+        if valid.size == 0:
+            for value in values[r]:
+                counts[value] += 1
+        else:
+            for c in range(values.shape[1]):
+                if valid[r, c]:
+                    counts[values[r, c]] += 1
     return counts
 
 
 @njit(cache=True)
 def _local_contrast(
     values: NDArray[Any],
+    counts: NDArray[np.int32],
+    kept: NDArray[np.bool_],
     rows: NDArray[np.int64],
     columns: NDArray[np.int64],
     floor: float,
@@ -154,13 +212,16 @@ def _local_contrast(
 ) -> tuple[float, float, float]:
     """Fill ``out`` with ``tone + margin * local``; return the sums of sigma, of pixels below the floor, and of pixels.
 
+    ``counts`` is the number of unmasked pixels in each window, or empty; masked ``values`` must be 0. ``kept`` says which pixels
+    count in the sums that are returned; empty for all.
+
     ``rows`` and ``columns`` say which pixel stands where in the photograph extended by half a window on each side.
     Sums over the window slide down the columns and then along each row, so their cost does not depend on its size.
     """
     height, width = values.shape
     window = len(rows) - height + 1
     half = window // 2
-    share = 1.0 / (window * window)
+    share = np.full(width, 1.0 / (window * window))
     # Column sums of x and x^2, extended to both sides; then those of the whole window, then local contrast, of one row.
     column_1, column_2 = np.zeros(width + 2 * half), np.zeros(width + 2 * half)
     sum_1, sum_2 = np.empty(width), np.empty(width)
@@ -192,10 +253,13 @@ def _local_contrast(
             sum_1[c], sum_2[c] = total_1, total_2
             total_1 -= column_1[c]
             total_2 -= column_2[c]
+        if counts.size:
+            for c in range(width):
+                share[c] = 1.0 / max(counts[r, c], 1)
         present = values[r]
         for c in range(width):
-            mean = sum_1[c] * share
-            variance = sum_2[c] * share - mean * mean
+            mean = sum_1[c] * share[c]
+            variance = sum_2[c] * share[c] - mean * mean
             sigma = np.float32(math.sqrt(max(variance, floor * floor)))
             distance = np.float32(float(present[c]) - mean)
             size = abs(distance)
@@ -218,10 +282,11 @@ def _local_contrast(
                 out[r, c] = np.uint8(tone[present[c]] + margin[present[c]] * local[c])
         if r % _EVERY == 0:
             for c in range(width):
-                variance = sum_2[c] * share - (sum_1[c] * share) ** 2
-                sigmas += math.sqrt(max(variance, 0.0))
-                under_floor += 1.0 if variance < floor * floor else 0.0
-            count += width
+                if kept.size == 0 or kept[r, c]:
+                    variance = sum_2[c] * share[c] - (sum_1[c] * share[c]) ** 2
+                    sigmas += math.sqrt(max(variance, 0.0))
+                    under_floor += 1.0 if variance < floor * floor else 0.0
+                    count += 1.0
         leaving = values[rows[r]]
         for c in range(width):
             x = float(leaving[c])
