@@ -82,8 +82,8 @@ def cloud_from_above(
     """
     frame = _frame(clouds)
     low, high = frame.low[:2], frame.high[:2]
-    for cloud in filter(None, clouds.values()):
-        low, high = np.minimum(low, cloud.centres[:, :2].min(axis=0)), np.maximum(high, cloud.centres[:, :2].max(axis=0))
+    centres = np.concatenate([cloud.centres[:, :2] for cloud in clouds.values() if cloud is not None])
+    low, high = np.minimum(low, centres.min(axis=0)), np.maximum(high, centres.max(axis=0))
     margin = 0.04 * float((high - low).max())
     low, high = low - margin, high + margin
     figure, panels = _panels(clouds, float((high - low)[1] / (high - low)[0]))

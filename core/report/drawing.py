@@ -45,14 +45,16 @@ def draw_tie_points(
 
     ``pixels`` are the photograph or a reduction of it, ``frame`` the width and height that ``xy`` are counted in (that of
     ``pixels`` by default). Dots shrink as they grow in number, so that they never cover more than a quarter of the picture;
-    those of the rarer kind lie on top.
+    those of the rarer kind lie on top. Points beyond the frame are not drawn.
     """
     picture = reduced(pixels, longer)
     rows, columns = picture.shape[:2]
     width, height = frame or (pixels.shape[1], pixels.shape[0])
     places = np.asarray(xy, np.float64).reshape(-1, 2) * [columns / width, rows / height]
+    inside = np.all((places >= 0) & (places < [columns, rows]), axis=1)
+    places, good = places[inside], np.asarray(kept, bool)[inside]
     radius = min(_LARGEST, float(np.sqrt(_SHARE * rows * columns / max(1, len(places)) / np.pi)))
-    groups = sorted(((places[kept], KEPT), (places[~kept], REJECTED)), key=lambda group: -len(group[0]))
+    groups = sorted(((places[good], KEPT), (places[~good], REJECTED)), key=lambda group: -len(group[0]))
     canvas = picture.astype(np.float32)
     for points, colour in groups:
         if radius >= 2.0:  # few dots can afford a rim, which shows them on any ground
@@ -63,11 +65,10 @@ def draw_tie_points(
 
 
 def _discs(points: NDArray[np.float64], radius: float, shape: tuple[int, int]) -> NDArray[np.float32]:
-    """Return how far discs about points (n, 2), pixels from the corner of the picture, cover each pixel, 0 to 1."""
+    """Return how far discs about points (n, 2) in the picture cover each pixel, 0 to 1."""
     reach = int(np.ceil(radius + 0.5))
     cover = np.zeros((shape[0] + 2 * reach, shape[1] + 2 * reach), np.float32)
-    inside = np.all((points >= 0) & (points < [shape[1], shape[0]]), axis=1)
-    x, y = points[inside].T
+    x, y = points.T
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):

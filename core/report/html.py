@@ -25,8 +25,9 @@ table{border-collapse:collapse;margin:1rem 0;font-variant-numeric:tabular-nums}
 th,td{padding:.25rem .7rem;border-bottom:1px solid #ddd;text-align:left}td.n{text-align:right}th{background:#f6f1e6}
 figure{margin:1.2rem 0}img{max-width:100%;height:auto}figcaption{color:#555;font-size:.9rem}
 p.verdict{font-size:1.15rem;background:#f6f1e6;padding:.7rem 1rem}p.warning{background:#fde9d9;padding:.5rem 1rem}
-.scroll{overflow-x:auto}
+.scroll{overflow-x:auto}summary{cursor:pointer;color:#2a6f97}
 """
+_LONG = 60  # rows up to which a table stands open
 
 
 class Report:
@@ -50,10 +51,13 @@ class Report:
         self._parts.append(f'<p class="warning">{html.escape(text)}</p>')
 
     def table(self, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-        """Add a table; numbers are aligned right, None is shown as a dash."""
+        """Add a table; numbers are aligned right, None is shown as a dash. A long one is folded: a click opens it."""
+        listed = list(rows)
         head = "".join(f"<th>{html.escape(c)}</th>" for c in columns)
-        body = "".join("<tr>" + "".join(_cell(v) for v in row) + "</tr>" for row in rows)
-        self._parts.append(f'<div class="scroll"><table><tr>{head}</tr>{body}</table></div>')
+        body = "".join("<tr>" + "".join(_cell(v) for v in row) + "</tr>" for row in listed)
+        table = f'<div class="scroll"><table><tr>{head}</tr>{body}</table></div>'
+        folded = f"<details><summary>All {len(listed)} rows</summary>{table}</details>"
+        self._parts.append(table if len(listed) <= _LONG else folded)
 
     def figure(self, figure: Figure, caption: str = "", *, dense: bool = False) -> None:
         """Add a matplotlib figure; one that is ``dense`` with dots takes a third of the bytes as JPEG."""
@@ -66,7 +70,8 @@ class Report:
         from PIL import Image
 
         stream = io.BytesIO()
-        Image.fromarray(pixels).save(stream, "JPEG", quality=88)
+        # Colour at full resolution, which keeps dots of a pixel or two in theirs.
+        Image.fromarray(pixels).save(stream, "JPEG", quality=80, subsampling=0)
         self._picture(stream.getvalue(), "jpeg", caption)
 
     def save(self, path: Path | str, copy: Path | str | None = None) -> None:

@@ -18,6 +18,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 CELLS = 10  # cells along each side of a photograph, whose share with a tie point is the coverage
+MOST_RAYS = 8  # points of that many rays and more are told together
 
 
 @dataclass(frozen=True)
@@ -55,18 +56,18 @@ def micmac_statistics(
     ``photograph`` is the index of the photograph and ``track`` the number of the tie point of each observation; ``residual`` (px)
     is the length of its 2D residual, which is read where ``kept``. A photograph's two observations of one point are one ray.
     """
-    rays = np.zeros(int(track.max(initial=-1)) + 1, np.int64)
-    seen = np.unique(np.stack([track, photograph]), axis=1)
-    np.add.at(rays, seen[0], 1)
-    multi = rays[track] >= 3
-    rows = []
-    for i in range(count):
-        mine = photograph == i
-        good = mine & kept
-        rms = float(np.sqrt(np.mean(residual[good] ** 2))) if good.any() else None
-        rows.append(
-            PhotographStatistics(int(mine.sum()), int(good.sum()), int((mine & multi).sum()), int((good & multi).sum()), rms)
+    multi = rays_per_point(photograph, track)[track] >= 3
+
+    def number(where: NDArray[np.bool_]) -> list[int]:
+        return np.bincount(photograph[where], minlength=count).tolist()
+
+    squares = np.bincount(photograph[kept], weights=residual[kept] ** 2, minlength=count).tolist()
+    rows = [
+        PhotographStatistics(entering, left, many, many_left, float(np.sqrt(total / left)) if left else None)
+        for entering, left, many, many_left, total in zip(
+            number(np.ones(len(kept), bool)), number(kept), number(multi), number(multi & kept), squares, strict=True
         )
+    ]
     shares = [100.0 * r.kept / r.observations for r in rows if r.observations]
     multi_shares = [100.0 * r.multi_kept / r.multi for r in rows if r.multi]
     return Statistics(
@@ -79,6 +80,29 @@ def micmac_statistics(
     )
 
 
+def rays_per_point(photograph: NDArray[np.integer], track: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Return the rays of each point 0 .. max(track) of observations (n,); two observations in one photograph are one ray."""
+    return np.bincount(_rays(photograph, track)[0], minlength=int(track.max(initial=-1)) + 1)
+
+
+def ray_histograms(photograph: NDArray[np.integer], track: NDArray[np.integer], count: int) -> NDArray[np.int64]:
+    """Return how many points of each photograph have how many rays, (count, MOST_RAYS + 1); the last column is MOST_RAYS or more.
+
+    ``photograph`` and ``track`` (n,) are observations of ``count`` photographs; a point that one observes twice counts once.
+    """
+    points, photographs = _rays(photograph, track)
+    rays = np.minimum(rays_per_point(photograph, track)[points], MOST_RAYS)
+    width = MOST_RAYS + 1
+    return np.bincount(photographs * width + rays, minlength=count * width).reshape(count, width)
+
+
+def _rays(photograph: NDArray[np.integer], track: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return point and photograph of each ray, a pair once, sorted."""
+    width = int(photograph.max(initial=0)) + 1
+    keys = np.unique(track.astype(np.int64) * width + photograph)  # one number a pair sorts many times faster than two rows
+    return keys // width, keys % width
+
+
 def weakest_link(photograph: NDArray[np.integer], track: NDArray[np.integer], count: int) -> tuple[int, list[int]] | None:
     """Return how many points hold the block together where it is weakest, and the smaller of the two parts they join.
 
@@ -88,27 +112,32 @@ def weakest_link(photograph: NDArray[np.integer], track: NDArray[np.integer], co
     """
     if count < 3:
         return None
-    seen = np.unique(np.stack([track, photograph]), axis=1)
-    rays = np.bincount(seen[0], minlength=1)
-    seen = seen[:, rays[seen[0]] >= 3]
-    incidence = coo_array((np.ones(seen.shape[1]), (seen[1], seen[0])), shape=(count, int(track.max(initial=0)) + 1)).tocsr()
+    points, photographs = _rays(photograph, track)
+    many = rays_per_point(photograph, track)[points] >= 3
+    ones, shape = np.ones(int(many.sum())), (count, int(track.max(initial=0)) + 1)
+    incidence = coo_array((ones, (photographs[many], points[many])), shape=shape).tocsr()
     shared = (incidence @ incidence.T).toarray()
     np.fill_diagonal(shared, 0)
     # scipy finds minimum trees of positive weights.
     tree = minimum_spanning_tree(coo_array(np.where(shared > 0, 1.0 / np.maximum(shared, 1), 0.0))).tocoo()
-    points = 0
+    least = 0
     if tree.nnz == count - 1:
         worst = int(tree.data.argmax())
-        points = int(shared[tree.row[worst], tree.col[worst]])
+        least = int(shared[tree.row[worst], tree.col[worst]])
         tree.data[worst] = 0.0
         tree.eliminate_zeros()
     _, part = connected_components(tree, directed=False)
     smallest = min(range(int(part.max()) + 1), key=lambda k: (int((part == k).sum()), k))
-    return points, np.flatnonzero(part == smallest).tolist()
+    return least, np.flatnonzero(part == smallest).tolist()
+
+
+def cell_counts(xy: NDArray[np.floating], width: int, height: int) -> NDArray[np.int64]:
+    """Return how many of the points (n, 2) lie in each of a photograph's 10 x 10 cells, (rows, columns)."""
+    place = np.asarray(xy, np.float64).reshape(-1, 2) * CELLS / [width, height]
+    column, row = np.clip(place, 0, CELLS - 1).astype(np.int64).T
+    return np.bincount(row * CELLS + column, minlength=CELLS**2).reshape(CELLS, CELLS)
 
 
 def coverage_percent(xy: NDArray[np.floating], width: int, height: int) -> float:
     """Return the percentage of a photograph's 10 x 10 cells that hold one or more of the points (n, 2)."""
-    column = np.clip(np.asarray(xy)[:, 0] * CELLS / width, 0, CELLS - 1).astype(np.int64)
-    row = np.clip(np.asarray(xy)[:, 1] * CELLS / height, 0, CELLS - 1).astype(np.int64)
-    return 100.0 * len(np.unique(row * CELLS + column)) / CELLS**2
+    return 100.0 * np.count_nonzero(cell_counts(xy, width, height)) / CELLS**2

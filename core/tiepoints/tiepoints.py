@@ -83,8 +83,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         images = [enhanced_path(survey, p) if enhanced else survey.path(p) for p in photographs]
         cache = survey.folder.absolute() / CACHE
         found = _features(request, photographs, images, enhanced, cache / "features", progress.part(0.0, 0.4))
-        xy = [read_features(path).xy for path in found]
-        counts = [len(points) for points in xy]
+        counts = [len(read_features(path)) for path in found]
         if min(counts) == 0:
             empty = [p.name for p, n in zip(photographs, counts, strict=True) if n == 0]
             progress.warn(f"No features were found in {some(empty)}.")
@@ -101,7 +100,16 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         if len(groups) > 1:
             progress.warn(_apart(photographs, groups))
         notes = [_apart(photographs, groups)] if len(groups) > 1 else []
-        write_report(survey, photographs, images, xy, pairs, rule=rule, notes=notes, copy=request.output_html_file)
+        write_report(
+            survey,
+            photographs,
+            images if enhanced else None,
+            found,
+            pairs,
+            rule=rule,
+            notes=notes,
+            copy=request.output_html_file,
+        )
         result = Result(request.survey, float(np.mean(counts)), len(pairs), match_count)
         survey.finish(
             "tiepoints",

@@ -3,107 +3,306 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..photographs.listing import some
-from ..photographs.reading import decode_pixels
+from ..photographs.reading import decode_pixels, mean_level, read_channel_sum
+from ..report.drawing import draw_coverage, draw_tie_points, side_by_side
 from ..report.html import Report, new_figure
 from ..survey import Photograph, Survey
+from .features import read_features
 from .matching import LEAST, LIMIT, PairMatches
 from .pairs import Pair
-from .statistics import CELLS, coverage_percent
+from .statistics import CELLS, cell_counts
 
 _WEAK_MATCHES = 200  # fewer verified matches with its best partner than this, and a photograph is weakly tied
 _WEAK_COVERAGE = 30.0  # percent of the cells
-_PICTURE = 900  # pixels of a picture's longer side
+_PICTURE = 580  # pixels of the longer side of each of two pictures in a row
+_CROP = 380  # pixels of a detail at full resolution
+_COVERAGES = 4  # photographs whose coverage is drawn
+_LISTED = 30  # weakly tied photographs that are told of one by one
+_NAMED = 12  # of these that are named in the graph
+_SCALES = np.geomspace(0.5, 64.0, 57)  # pixels, edges of the histogram of scales
+_METRES = 111_200.0  # of a degree of latitude, near enough to draw
+_MATCHED, _OTHERS = "#0078ff", "#ff4800"
+
+
+@dataclass(frozen=True)
+class _Ties:
+    """What is told of each photograph (n of them): features, those matched, pairs, the best partner, matches by cell."""
+
+    features: NDArray[np.int64]
+    matched: NDArray[np.int64]
+    pairs: NDArray[np.int64]
+    best: NDArray[np.int64]  # matches with the best partner
+    partner: NDArray[np.int64]  # who that is, -1 for nobody
+    cells: NDArray[np.int64]  # (n, CELLS, CELLS) matched features
+    scales: NDArray[np.int64]  # (2, bins) of _SCALES, features in no pair and matched ones
+
+    @property
+    def coverage(self) -> NDArray[np.float64]:
+        """The percentage of cells with a matched feature (n,)."""
+        return 100.0 * np.count_nonzero(self.cells, axis=(1, 2)) / CELLS**2
 
 
 def write_report(
     survey: Survey,
     photographs: Sequence[Photograph],
-    images: Sequence[Path],
-    xy: Sequence[NDArray[np.float32]],
+    enhanced: Sequence[Path] | None,
+    features: Sequence[Path],
     pairs: Mapping[Pair, PairMatches],
     *,
     rule: str,
     notes: Sequence[str],
     copy: str | None,
 ) -> None:
-    """Write the report; ``images`` are those searched, ``xy`` the features' places (n, 2), ``rule`` how pairs were chosen."""
-    count = len(photographs)
-    matrix = np.zeros((count, count), np.int64)
-    tied: list[NDArray[np.bool_]] = [np.zeros(len(points), bool) for points in xy]
-    for (i, j), pair in pairs.items():
-        matrix[i, j] = matrix[j, i] = len(pair.matches)
-        tied[i][pair.matches[:, 0]] = True
-        tied[j][pair.matches[:, 1]] = True
-    covered = [coverage_percent(p[t], q.width, q.height) for p, t, q in zip(xy, tied, photographs, strict=True)]
-    total = int(matrix.sum() // 2)
+    """Write the report.
+
+    ``enhanced`` are the images searched, None when they were the photographs themselves; ``features`` the files of
+    ``write_features``, which are read one at a time; ``rule`` tells how pairs were chosen.
+    """
+    matched = _matched(len(photographs), pairs)
+    ties = _ties(photographs, features, pairs, matched)
+    coverage = ties.coverage
+    total = sum(len(pair.matches) for pair in pairs.values())
     report = Report(
         "Tie points",
-        f"{count} photographs with {np.mean([len(p) for p in xy]):.0f} features each on average; {len(pairs)} pairs share "
-        f"{total} verified matches, which cover {np.mean(covered):.0f} % of a photograph on average.",
+        f"{len(photographs)} photographs with {ties.features.mean():.0f} features each on average; {len(pairs)} pairs share "
+        f"{total} verified matches, which cover {coverage.mean():.0f} % of a photograph on average.",
     )
     for note in notes:
         report.warning(note)
-    best = matrix.max(axis=1)
-    weak = [p.name for i, p in enumerate(photographs) if best[i] < _WEAK_MATCHES or covered[i] < _WEAK_COVERAGE]
+    weak = {i: why for i in range(len(photographs)) if (why := _weakness(ties, i))}
     if weak:
-        report.warning(f"Weakly tied: {some(weak)}. Their orientation may be uncertain or fail.")
+        report.warning(f"Weakly tied: {some(photographs[i].name for i in weak)}. Their orientation may be uncertain or fail.")
     report.text(
         f"{rule}. A match is verified when it agrees with one epipolar geometry (or homography) of its pair to "
         f"{LIMIT * 2000:.0f} pixels of a photograph 2000 pixels long; a pair needs {LEAST}. Coverage is the share of {CELLS} x "
         f"{CELLS} cells with one or more matched features."
     )
-    _draw_matrix(report, matrix)
-    order = np.argsort([matrix[i].sum() for i in range(count)], kind="stable")
-    for i in dict.fromkeys((int(order[0]), int(order[count // 2]))):
-        _draw_photograph(report, photographs[i], images[i], xy[i], tied[i])
+    report.heading("Weakest photographs")
+    _tell_weak(report, survey, photographs, ties, weak)
+    report.heading("Pairs")
+    _draw_graph(report, photographs, pairs, ties, weak)
+    _draw_matrix(report, len(photographs), pairs)
+    report.heading("Features")
+    _draw_histograms(report, ties)
+    order = np.argsort(ties.matched, kind="stable")
+    chosen = {"barest": int(order[0]), "median": int(order[(len(order) - 1) // 2]), "richest": int(order[-1])}
+    for rank, i in chosen.items():
+        xy = read_features(features[i]).xy
+        tied = np.zeros(len(xy), bool)
+        tied[matched[i]] = True
+        searched = enhanced[i] if enhanced else None
+        _draw_photograph(report, f"The {rank} photograph", survey, photographs[i], searched, xy, tied, detail=rank == "median")
     report.heading("Photographs")
     report.table(
-        ["name", "features", "matched", "pairs", "matches with the best partner", "coverage (%)"],
+        ["name", "features", "matched", "pairs", "best partner", "matches with it", "coverage (%)"],
         [
-            (p.name, len(xy[i]), int(tied[i].sum()), int((matrix[i] > 0).sum()), int(matrix[i].max()), covered[i])
+            (
+                p.name,
+                int(ties.features[i]),
+                int(ties.matched[i]),
+                int(ties.pairs[i]),
+                photographs[ties.partner[i]].name if ties.best[i] else None,
+                int(ties.best[i]),
+                float(coverage[i]),
+            )
             for i, p in enumerate(photographs)
         ],
     )
     report.save(survey.report_path("tiepoints"), copy)
 
 
-def _draw_matrix(report: Report, matrix: NDArray[np.int64]) -> None:
-    report.heading("Pairs")
+def _matched(count: int, pairs: Mapping[Pair, PairMatches]) -> list[NDArray[np.int64]]:
+    """Return the indices of each photograph's features that are matched in some pair, each once."""
+    parts: list[list[NDArray[Any]]] = [[np.zeros(0, np.int64)] for _ in range(count)]
+    for (i, j), pair in pairs.items():
+        parts[i].append(pair.matches[:, 0])
+        parts[j].append(pair.matches[:, 1])
+    return [np.unique(np.concatenate(part)).astype(np.int64) for part in parts]
+
+
+def _ties(
+    photographs: Sequence[Photograph],
+    features: Sequence[Path],
+    pairs: Mapping[Pair, PairMatches],
+    matched: Sequence[NDArray[np.int64]],
+) -> _Ties:
+    count = len(photographs)
+    partners, best, partner = np.zeros(count, np.int64), np.zeros(count, np.int64), np.full(count, -1, np.int64)
+    for (i, j), pair in pairs.items():
+        for a, b in ((i, j), (j, i)):
+            partners[a] += 1
+            if len(pair.matches) > best[a]:
+                best[a], partner[a] = len(pair.matches), b
+    found = np.zeros(count, np.int64)
+    cells = np.zeros((count, CELLS, CELLS), np.int64)
+    scales = np.zeros((2, len(_SCALES) - 1), np.int64)
+    for i, (photograph, path) in enumerate(zip(photographs, features, strict=True)):
+        one = read_features(path)
+        found[i] = len(one)
+        cells[i] = cell_counts(one.xy[matched[i]], photograph.width, photograph.height)
+        tied = np.zeros(len(one), bool)
+        tied[matched[i]] = True
+        for k, chosen in enumerate((~tied, tied)):
+            scales[k] += np.histogram(np.clip(one.scale[chosen], _SCALES[0], _SCALES[-1]), bins=_SCALES)[0]
+    return _Ties(found, np.array([len(m) for m in matched]), partners, best, partner, cells, scales)
+
+
+def _weakness(ties: _Ties, i: int) -> str:
+    """Return why a photograph is weakly tied, nothing when it is not."""
+    if not ties.features[i]:
+        return "no features were found in it"
+    if not ties.pairs[i]:
+        return "it shares verified matches with no other"
+    why = []
+    if ties.best[i] < _WEAK_MATCHES:
+        why.append(f"{ties.best[i]} matches with its best partner (fewer than {_WEAK_MATCHES})")
+    if ties.coverage[i] < _WEAK_COVERAGE:
+        why.append(f"matches on {ties.coverage[i]:.0f} % of it (less than {_WEAK_COVERAGE:.0f} %)")
+    if ties.pairs[i] == 1 and len(ties.pairs) > 2:
+        why.append("tied to one other only")
+    return "; ".join(why)
+
+
+def _tell_weak(report: Report, survey: Survey, photographs: Sequence[Photograph], ties: _Ties, weak: Mapping[int, str]) -> None:
+    """Say which photographs are weakly tied and why, and draw the coverage of the least covered ones."""
+    worst = np.lexsort((ties.matched, ties.coverage))
+    if weak:
+        listed = [int(i) for i in worst if int(i) in weak]
+        report.table(["name", "why"], [(photographs[i].name, weak[i]) for i in listed[:_LISTED]])
+        if len(listed) > _LISTED:
+            report.text(f"{len(listed) - _LISTED} more are weakly tied; the last table has them all.")
+    else:
+        report.text("No photograph is weakly tied.")
+    shown = worst[: min(_COVERAGES, len(photographs))].tolist()
+    for k in range(0, len(shown), 2):
+        row = shown[k : k + 2]
+        pictures = [draw_coverage(_tones(survey, photographs[i]), ties.cells[i]) for i in row]
+        named = "; ".join(f"{photographs[i].name}, {ties.coverage[i]:.0f} % covered" for i in row)
+        caption = f"The least covered, left to right: {named}. Matched features in each cell; red: none."
+        report.picture(side_by_side(*pictures), caption)
+
+
+def _draw_graph(
+    report: Report, photographs: Sequence[Photograph], pairs: Mapping[Pair, PairMatches], ties: _Ties, weak: Mapping[int, str]
+) -> None:
+    """Draw the pairs between the photographs' GNSS positions, when there are any."""
+    from matplotlib.collections import LineCollection
+
+    placed = {i: p.position for i, p in enumerate(photographs) if p.position}
+    drawn = sorted((len(pair.matches), i, j) for (i, j), pair in pairs.items() if i in placed and j in placed)
+    if not drawn:
+        return
+    degrees = np.array([(q.longitude, q.latitude) for q in placed.values()])
+    metres = (degrees - degrees.mean(axis=0)) * _METRES * [np.cos(np.radians(degrees[:, 1].mean())), 1.0]
+    place = dict(zip(placed, metres.tolist(), strict=True))
+    extent = np.ptp(metres, axis=0)
+    figure = new_figure(9.0, float(np.clip(7.6 * extent[1] / max(extent[0], 1e-6), 2.5, 6.5)) + 0.7)
+    axes = figure.add_subplot()
+    strength = np.array([n for n, _, _ in drawn], float)
+    lines = LineCollection(
+        [(place[i], place[j]) for _, i, j in drawn],
+        linewidths=0.2 + 3.0 * strength / strength.max(),
+        array=np.log10(strength),
+        cmap="YlGnBu",
+        clim=(1.0, max(2.0, float(np.log10(strength.max())))),
+        zorder=1,
+    )
+    axes.add_collection(lines)
+    _log_bar(figure, lines, axes, float(np.log10(strength.max())))
+    colours = ["#d62728" if i in weak else "black" for i in placed]
+    axes.scatter(
+        metres[:, 0], metres[:, 1], c=colours, s=22 if len(placed) < 200 else 7, edgecolors="white", linewidths=0.5, zorder=2
+    )
+    for i in [i for i in np.argsort(ties.matched, kind="stable").tolist() if i in weak and i in placed][:_NAMED]:
+        axes.annotate(Path(photographs[i].name).stem, place[i], fontsize=7, textcoords="offset points", xytext=(4, 4))
+    axes.set(xlabel="to the east (m)", ylabel="to the north (m)", aspect="equal")
+    axes.margins(0.06)
+    left = len(photographs) - len(placed)
+    report.figure(
+        figure,
+        "Pairs between the photographs' GNSS positions, the wider and darker the more verified matches; red: weakly tied."
+        + (f" {left} photographs without a position are not drawn." if left else ""),
+        dense=len(drawn) > 200,
+    )
+
+
+def _draw_matrix(report: Report, count: int, pairs: Mapping[Pair, PairMatches]) -> None:
     figure = new_figure(7.0, 6.0)
     axes = figure.add_subplot()
-    shown = np.where(matrix > 0, np.log10(np.maximum(matrix, 1)), np.nan)
-    image: Any = axes.imshow(shown, cmap="YlGnBu", vmin=1.0, interpolation="nearest")
-    bar = figure.colorbar(image, ax=axes, label="verified matches")
-    ticks = np.arange(1, max(2, int(np.ceil(np.nanmax(shown)))) + 1)
-    bar.set_ticks(ticks.tolist(), labels=[f"{10.0**t:.0f}" for t in ticks])
+    shown = np.full((count, count), np.nan, np.float32)
+    for (i, j), pair in pairs.items():
+        shown[i, j] = shown[j, i] = np.log10(len(pair.matches))
+    top = float(np.nanmax(shown))
+    image: Any = axes.imshow(shown, cmap="YlGnBu", vmin=1.0, vmax=max(2.0, top), interpolation="nearest")
+    _log_bar(figure, image, axes, top)
     axes.set_xlabel("photograph, in the order of the table below")
     axes.set_ylabel("photograph")
     report.figure(figure, "Verified matches of each pair of photographs; white: none.")
 
 
+def _log_bar(figure: Any, mappable: Any, axes: Any, top: float) -> None:
+    ticks = np.arange(1, max(2, int(top)) + 1)
+    bar = figure.colorbar(mappable, ax=axes, label="verified matches", shrink=0.8)
+    bar.set_ticks(ticks.tolist(), labels=[f"{10.0**t:.0f}" for t in ticks])
+
+
+def _draw_histograms(report: Report, ties: _Ties) -> None:
+    figure = new_figure(9.0, 3.2)
+    left, right = figure.subplots(1, 2)
+    edges = np.linspace(0, max(1, int(ties.features.max())), 31)
+    left.hist(ties.features, bins=edges.tolist(), color="#bbbbbb", label="all")
+    left.hist(ties.matched, bins=edges.tolist(), color=_MATCHED, alpha=0.7, label="matched")
+    left.set(xlabel="features of a photograph", ylabel="photographs", xlim=(0, edges[-1]))
+    left.legend(fontsize=8)
+    for counts, colour, name in zip(ties.scales, (_OTHERS, _MATCHED), ("in no pair", "matched"), strict=True):
+        right.stairs(counts, _SCALES, color=colour, linewidth=1.4, label=name)
+    full = np.flatnonzero(ties.scales.sum(axis=0))
+    if len(full):
+        right.set_xlim(_SCALES[full[0]] / 1.1, _SCALES[full[-1] + 1] * 1.1)
+    right.set_xscale("log", base=2)
+    right.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    right.set(xlabel="scale of a feature (sigma, px)", ylabel="features")
+    right.legend(fontsize=8)
+    figure.tight_layout()
+    report.figure(figure, "Features per photograph, and the scales of those that are matched in some pair and in none.")
+
+
 def _draw_photograph(
-    report: Report, photograph: Photograph, image: Path, xy: NDArray[np.float32], tied: NDArray[np.bool_]
+    report: Report,
+    title: str,
+    survey: Survey,
+    photograph: Photograph,
+    enhanced: Path | None,
+    xy: NDArray[np.float32],
+    tied: NDArray[np.bool_],
+    *,
+    detail: bool,
 ) -> None:
-    pixels = decode_pixels(image.read_bytes())
-    if pixels.dtype != np.uint8:
-        pixels = (pixels >> 8).astype(np.uint8)
-    factor = min(1.0, _PICTURE / max(pixels.shape[:2]))
-    small = cv2.resize(pixels, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-    canvas = cv2.cvtColor(small, cv2.COLOR_GRAY2RGB if small.ndim == 2 else cv2.COLOR_BGR2RGB)
-    canvas = (canvas.astype(np.uint16) * 2 // 3).astype(np.uint8)
-    for place, good in sorted(zip(xy.tolist(), tied.tolist(), strict=True), key=lambda item: item[1]):
-        centre = (round(place[0] * factor), round(place[1] * factor))
-        cv2.circle(canvas, centre, 1, (120, 230, 120) if good else (220, 90, 60), -1)
+    """Draw the features on the photograph in its own tones and, beside it, on the enhanced image that was searched."""
+    grounds = [_tones(survey, photograph)]
+    if enhanced is not None:
+        grounds.append(decode_pixels(enhanced.read_bytes()))
+    where = "on the photograph and on the enhanced image" if enhanced is not None else "on the photograph"
     good = int(tied.sum())
+    report.heading(f"{title}: {photograph.name}")
     report.picture(
-        canvas,
-        f"{photograph.name}: features that are matched in some pair (green, {good}) and in none (red, {len(tied) - good}).",
+        side_by_side(*(draw_tie_points(ground, xy, tied, longer=_PICTURE) for ground in grounds)),
+        f"Features that are matched in some pair (blue, {good}) and in none (orange, {len(tied) - good}), {where}.",
     )
+    if detail:
+        corner = np.array([max(0, (photograph.width - _CROP) // 2), max(0, (photograph.height - _CROP) // 2)])
+        crops = [ground[corner[1] : corner[1] + _CROP, corner[0] : corner[0] + _CROP] for ground in grounds]
+        pictures = (draw_tie_points(crop, xy - corner, tied, longer=_PICTURE) for crop in crops)
+        report.picture(side_by_side(*pictures), f"The same, {_CROP} pixels from the middle at full resolution.")
+
+
+def _tones(survey: Survey, photograph: Photograph) -> NDArray[np.uint8]:
+    return mean_level(read_channel_sum(survey.path(photograph), photograph))

@@ -2,7 +2,15 @@
 
 import numpy as np
 import pytest
-from strandline.core.tiepoints.statistics import coverage_percent, micmac_statistics, weakest_link
+from strandline.core.tiepoints.statistics import (
+    MOST_RAYS,
+    cell_counts,
+    coverage_percent,
+    micmac_statistics,
+    ray_histograms,
+    rays_per_point,
+    weakest_link,
+)
 
 
 def test_statistics_of_four_points_in_three_photographs():
@@ -35,6 +43,21 @@ def test_a_photograph_without_observations_counts_in_the_mean_but_not_in_the_per
     assert s.mse == 0.5
 
 
+def test_statistics_agree_with_counting_one_photograph_after_the_other():
+    rng = np.random.default_rng(3)
+    photograph, track = rng.integers(0, 9, 4000), rng.integers(0, 900, 4000)
+    residual = rng.rayleigh(0.5, 4000)
+    kept = residual < 1.2
+    s = micmac_statistics(photograph, track, residual, kept, 10)
+    rays = [len(set(photograph[track == t].tolist())) for t in range(900)]
+    multi = np.array(rays)[track] >= 3
+    for i, p in enumerate(s.photographs):
+        mine = photograph == i
+        numbers = [int(m.sum()) for m in (mine, mine & kept, mine & multi, mine & multi & kept)]
+        assert [p.observations, p.kept, p.multi, p.multi_kept] == numbers
+        assert p.rms == (pytest.approx(np.sqrt(np.mean(residual[mine & kept] ** 2))) if numbers[1] else None)
+
+
 def test_nothing_kept_has_no_residual():
     s = micmac_statistics(np.array([0, 1]), np.array([0, 0]), np.full(2, np.inf), np.zeros(2, bool), 2)
     assert s.mse is None
@@ -46,6 +69,30 @@ def test_coverage_counts_cells():
     xy = np.array([[0.0, 0.0], [9.9, 4.9], [10.1, 0.0], [100.0, 50.0]])
     assert coverage_percent(xy, 100, 50) == 3.0
     assert coverage_percent(np.zeros((0, 2)), 100, 50) == 0.0
+
+
+def test_cells_are_counted_by_row_and_column():
+    xy = np.array([[0.0, 0.0], [1.0, 1.0], [95.0, 2.0], [5.0, 49.0], [100.0, 50.0]])
+    counts = cell_counts(xy, 100, 50)
+    assert counts.shape == (10, 10)
+    assert (counts[0, 0], counts[0, 9], counts[9, 0], counts[9, 9], counts.sum()) == (2, 1, 1, 1, 5)
+
+
+def test_rays_are_counted_per_point_and_per_photograph():
+    # Point 0: photographs 0, 1, 2; point 1: 0 (twice) and 1; point 2: none; point 3: only 2.
+    photograph = np.array([0, 1, 2, 0, 0, 1, 2])
+    track = np.array([0, 0, 0, 1, 1, 1, 3])
+    assert rays_per_point(photograph, track).tolist() == [3, 2, 0, 1]
+    histograms = ray_histograms(photograph, track, 4)
+    assert histograms[:, :4].tolist() == [[0, 0, 1, 1], [0, 0, 1, 1], [0, 1, 0, 1], [0, 0, 0, 0]]
+    assert histograms[:, 4:].sum() == 0
+
+
+def test_many_rays_are_told_together():
+    n = MOST_RAYS + 3
+    histograms = ray_histograms(np.arange(n), np.zeros(n, int), n)
+    assert histograms[:, MOST_RAYS].tolist() == [1] * n
+    assert histograms.sum() == n
 
 
 def chain(links):
