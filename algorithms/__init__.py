@@ -1,6 +1,7 @@
 """The Processing algorithms, one file each, named after the id."""
 
 from .checkengine import CheckEngine
+from .compareinputs import CompareInputs
 from .createsurvey import CreateSurvey
 from .dsmdifference import DsmDifference
 from .enhance import Enhance
@@ -18,6 +19,7 @@ ALGORITHMS = (
     Georeference,
     ExportDsm,
     DsmDifference,
+    CompareInputs,
     SimulateSurvey,
     CheckEngine,
 )

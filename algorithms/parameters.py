@@ -149,9 +149,9 @@ def scheduler() -> _Parameter:
     return advanced(words("SCHEDULER", tr("Dask scheduler"), text))
 
 
-def folder_output(key: str, label: str, text: str) -> _Parameter:
+def folder_output(key: str, label: str, text: str, *, optional: bool = False) -> _Parameter:
     """Return a folder to make."""
-    return explained(QgsProcessingParameterFolderDestination(key, label), text)
+    return explained(QgsProcessingParameterFolderDestination(key, label, None, optional, not optional), text)
 
 
 def raster_output(key: str, label: str, text: str, *, optional: bool = True, by_default: bool = False) -> _Parameter:
@@ -168,6 +168,11 @@ def file_output(key: str, label: str, text: str, *, filters: str, by_default: bo
 def point_output(key: str, label: str, text: str) -> _Parameter:
     """Return an optional point layer to write."""
     return explained(QgsProcessingParameterFeatureSink(key, label, _POINTS, None, True, True), text)
+
+
+def table_output(key: str, label: str, text: str) -> _Parameter:
+    """Return an optional table to write."""
+    return explained(QgsProcessingParameterFeatureSink(key, label, _ANY, None, True, True), text)
 
 
 def polygon_output(key: str, label: str, text: str) -> _Parameter:

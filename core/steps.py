@@ -16,6 +16,7 @@ _MODULES = {
     "georeference": ".orientation.georeference",
     "exportdsm": ".surface.exportdsm",
     "dsmdifference": ".change.dsmdifference",
+    "compareinputs": ".comparison.compareinputs",
     "simulatesurvey": ".simulation.simulatesurvey",
     "checkengine": ".checkengine",
 }

@@ -1,0 +1,1 @@
+"""JPG, RAW and their enhanced versions of one flight, side by side."""
