@@ -29,7 +29,7 @@ def inspect(path: str, name: str) -> Inspection | str:
     try:
         data = Path(path).read_bytes()
         raw = is_raw(name)
-        width, height = decode_raw(data).pixels.shape[1::-1] if raw else frame_size(data)
+        width, height = decode_raw(data).values.shape[1::-1] if raw else frame_size(data)
     except OSError as error:
         return error.strerror or "unreadable"
     except ValueError as error:

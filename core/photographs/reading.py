@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import re
 import struct
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
@@ -21,7 +21,7 @@ from PIL import Image
 from ..errors import InputError
 from ..files import bytes_digest
 from ..survey import Photograph
-from .raw import decode_raw
+from .raw import SATURATION, decode_raw, summed
 
 JPG = frozenset({".jpg", ".jpeg", ".jpe"})
 TIFF = frozenset({".tif", ".tiff"})
@@ -91,9 +91,8 @@ def read_channel_sum(path: Path, photograph: Photograph) -> ChannelSum:
         raise InputError(f"The photograph {path} has changed since the survey was made: run 'Create survey' again.")
     try:
         if is_raw(photograph.name):
-            develop = decode_raw(data)
-            total = channel_sum(develop.pixels)
-            return replace(total, step=develop.step, linear=True)
+            raw = decode_raw(data)
+            return ChannelSum(summed(raw), raw.channels, raw.channels * SATURATION, raw.step, linear=True)
         return channel_sum(decode_pixels(data))
     except ValueError as error:
         raise InputError(f"The photograph {path} is {error}: copy it again from the camera.") from error
