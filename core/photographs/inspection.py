@@ -8,8 +8,8 @@ from pathlib import Path
 from ..files import bytes_digest
 from ..survey import Photograph
 from .metadata import camera_name, focal_pixels, read_metadata
-from .raw import decode_raw
 from .reading import frame_size, is_raw
+from .wholeness import whole_raw
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ def inspect(path: str, name: str) -> Inspection | str:
     try:
         data = Path(path).read_bytes()
         raw = is_raw(name)
-        width, height = decode_raw(data).values.shape[1::-1] if raw else frame_size(data)
+        width, height = whole_raw(data).values.shape[1::-1] if raw else frame_size(data)
     except OSError as error:
         return error.strerror or "unreadable"
     except ValueError as error:
