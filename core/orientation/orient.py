@@ -155,12 +155,14 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
         model.write(part)
     for text in (doubt := far_off(model, priors, fixed)):
         progress.warn(text)
-    link = _weak_link(calibrating.observations(model), ids, names)
+    kept = calibrating.observations(model)
+    link = _weak_link(kept, ids, names)
     if link:
         progress.warn(link)
     outcome = Orientation(
         statistics=statistics,
-        observations=calibrating.observations(model),
+        entering=entering,
+        observations=kept,
         image_ids=ids,
         limit=limit,
         missing=missing,

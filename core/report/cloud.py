@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 _DRAWN = 20000  # points of the richest cloud that are drawn; the others are thinned by the same factor
 _OUTLIERS = 0.003  # share of points beyond each side of the frame
-_RELIEF = 0.2  # of the shorter side: how high heights should look
+_RELIEF = 0.25  # of the shorter side: how high heights should look
 _GRID = 160  # cells of the surface that gives points their light, along the longer side
 _AZIMUTH, _ALTITUDE = -65.0, 28.0  # degrees, where the eye of the perspective is
 _DISTANCE = 2.4  # of the eye, in diagonals of the block
@@ -136,13 +136,17 @@ def cloud_in_perspective(clouds: Mapping[str, Cloud | None], *, unit: str = "m")
     lowest.text(
         0.0,
         0.0,
-        f"Base {size[0]:.3g} x {size[1]:.3g}, heights over {size[2]:.2g} ({unit}), drawn {factor:g} times as high.",
+        f"Base {size[0]:.3g} x {size[1]:.3g}, heights over {size[2]:.2g} ({unit}), {_times(factor)}.",
         fontsize=8,
         color="#555555",
         transform=lowest.transAxes,
     )
     _height_bar(figure, panels, frame, unit)
     return figure
+
+
+def _times(factor: float) -> str:
+    return "not exaggerated" if factor == 1 else f"{factor:g} times exaggerated"
 
 
 def _draw_perspective(axes: Axes, cloud: Cloud, frame: _Frame, factor: float) -> None:

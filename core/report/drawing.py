@@ -57,7 +57,7 @@ def draw_tie_points(
     groups = sorted(((places[good], KEPT), (places[~good], REJECTED)), key=lambda group: -len(group[0]))
     canvas = picture.astype(np.float32)
     for points, colour in groups:
-        if radius >= 2.0:  # few dots can afford a rim, which shows them on any ground
+        if radius >= _LARGEST:  # few dots can afford a rim, which shows them on any ground
             _blend(canvas, _discs(points, radius + 1.2, (rows, columns)), (20, 20, 20))
         strength = min(1.0, (radius / _SMALLEST) ** 2)
         _blend(canvas, strength * _discs(points, max(radius, _SMALLEST), (rows, columns)), colour)

@@ -20,11 +20,12 @@ from .matching import LEAST, LIMIT, PairMatches
 from .pairs import Pair
 from .statistics import CELLS, cell_counts
 
+COVERAGES = 4  # photographs whose coverage is drawn
+
 _WEAK_MATCHES = 200  # fewer verified matches with its best partner than this, and a photograph is weakly tied
 _WEAK_COVERAGE = 30.0  # percent of the cells
 _PICTURE = 580  # pixels of the longer side of each of two pictures in a row
 _CROP = 380  # pixels of a detail at full resolution
-_COVERAGES = 4  # photographs whose coverage is drawn
 _LISTED = 30  # weakly tied photographs that are told of one by one
 _NAMED = 12  # of these that are named in the graph
 _SCALES = np.geomspace(0.5, 64.0, 57)  # pixels, edges of the histogram of scales
@@ -181,13 +182,25 @@ def _tell_weak(report: Report, survey: Survey, photographs: Sequence[Photograph]
             report.text(f"{len(listed) - _LISTED} more are weakly tied; the last table has them all.")
     else:
         report.text("No photograph is weakly tied.")
-    shown = worst[: min(_COVERAGES, len(photographs))].tolist()
-    for k in range(0, len(shown), 2):
-        row = shown[k : k + 2]
-        pictures = [draw_coverage(_tones(survey, photographs[i]), ties.cells[i]) for i in row]
-        named = "; ".join(f"{photographs[i].name}, {ties.coverage[i]:.0f} % covered" for i in row)
-        caption = f"The least covered, left to right: {named}. Matched features in each cell; red: none."
-        report.picture(side_by_side(*pictures), caption)
+    least = worst[:COVERAGES].tolist()
+    draw_coverages(report, survey, [photographs[i] for i in least], ties.cells[least], "Matched features")
+
+
+def draw_coverages(
+    report: Report, survey: Survey, photographs: Sequence[Photograph], cells: NDArray[np.int64], what: str
+) -> None:
+    """Draw the least covered photographs two in a row; ``cells`` (n, rows, columns) count ``what``.
+
+    Raises
+    ------
+    InputError
+        When a photograph cannot be read.
+    """
+    for k in range(0, len(photographs), 2):
+        row = range(k, min(k + 2, len(photographs)))
+        pictures = [draw_coverage(tones(survey, photographs[i]), cells[i]) for i in row]
+        named = "; ".join(f"{photographs[i].name}, {100 * np.mean(cells[i] > 0):.0f} % covered" for i in row)
+        report.picture(side_by_side(*pictures), f"The least covered, left to right: {named}. {what} in each cell; red: none.")
 
 
 def _draw_graph(
@@ -287,7 +300,7 @@ def _draw_photograph(
     detail: bool,
 ) -> None:
     """Draw the features on the photograph in its own tones and, beside it, on the enhanced image that was searched."""
-    grounds = [_tones(survey, photograph)]
+    grounds = [tones(survey, photograph)]
     if enhanced is not None:
         grounds.append(decode_pixels(enhanced.read_bytes()))
     where = "on the photograph and on the enhanced image" if enhanced is not None else "on the photograph"
@@ -304,5 +317,6 @@ def _draw_photograph(
         report.picture(side_by_side(*pictures), f"The same, {_CROP} pixels from the middle at full resolution.")
 
 
-def _tones(survey: Survey, photograph: Photograph) -> NDArray[np.uint8]:
+def tones(survey: Survey, photograph: Photograph) -> NDArray[np.uint8]:
+    """Return a photograph (rows, columns) in its own tones: the mean of its channels at 8 bits."""
     return mean_level(read_channel_sum(survey.path(photograph), photograph))

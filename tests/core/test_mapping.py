@@ -9,7 +9,7 @@ from strandline.core.camera import Camera
 from strandline.core.orientation.focal import FocalPrior, far_off
 from strandline.core.orientation.mapping import map_photographs, read_network, triangulate
 from strandline.core.orientation.merging import join
-from strandline.core.orientation.orientreport import residual_field
+from strandline.core.orientation.orientpictures import residual_field
 from strandline.core.orientation.pointcloud import write_points
 from strandline.core.orientation.selfcalibration import (
     MODELS,
@@ -288,6 +288,11 @@ def test_the_cloud_keeps_six_digits_of_any_unit(tmp_path):
 
 
 def test_the_residual_field_is_the_mean_of_each_cell():
-    xy = np.concatenate([np.full((10, 2), 5.0), np.full((9, 2), 100.0), np.full((20, 2), [155.0, 75.0])])
-    residual = np.concatenate([np.full((10, 2), [1.0, -1.0]), np.ones((9, 2)), np.full((20, 2), [0.5, 0.0])])
-    assert residual_field(xy, residual, 160, 80).tolist() == [[5.0, 5.0, 1.0, -1.0], [155.0, 75.0, 0.5, 0.0]]
+    xy = np.concatenate(
+        [np.full((10, 2), 5.0), np.full((9, 2), 100.0), np.full((20, 2), [155.0, 75.0]), np.full((10, 2), [160.0, 5.0])]
+    )
+    mixed = np.tile([[2.0, 0.0], [0.0, 0.0]], (5, 1))  # mean 1, variance 1 in x: ten of them leave a third by chance
+    residual = np.concatenate([np.full((10, 2), [1.0, -1.0]), np.ones((9, 2)), np.full((20, 2), [0.5, 0.0]), mixed])
+    field = residual_field(xy, residual, 160, 80)
+    assert field[:, :4].tolist() == [[5.0, 5.0, 1.0, -1.0], [155.0, 5.0, 1.0, 0.0], [155.0, 75.0, 0.5, 0.0]]
+    assert field[:, 4] == pytest.approx([0.0, 1 / 3, 0.0])
