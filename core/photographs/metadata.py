@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import io
 import math
 import re
 import warnings
 from dataclasses import dataclass
 from typing import Any
 
-from PIL import ExifTags, Image
+from PIL import ExifTags
 
 from ..survey import Position
+from .containers import Tags, read_tags
 from .reading import BROKEN
 from .xmp import DJI, PIX4D_CAMERA, parse_xmp, xmp_number
 
 _DIAGONAL_35MM = math.hypot(36.0, 24.0)  # mm
 _SENSORS = 2.0, 100.0  # mm, the longer side
-_TIFF_HEADS = (b"II*\0", b"MM\0*")
+_CUT = 0.05  # share by which nobody makes a photograph smaller
 _PER_MM = {2: 1 / 25.4, 3: 0.1, 4: 1.0, 5: 1000.0}  # FocalPlaneResolutionUnit: inch, cm, mm, um
 
 
@@ -49,7 +49,7 @@ class Metadata:
 def read_metadata(data: bytes) -> Metadata:
     """Read the EXIF and XMP of a photograph from its file's content.
 
-    JPG, PNG and whatever is built like a TIFF (most RAW files are) are understood; other files tell nothing.
+    JPG, PNG, CR3, RAF and whatever is built like a TIFF (most RAW files are) are understood; other files tell nothing.
 
     A position and its height are EXIF's. Where the XMP gives the sigmas of an RTK receiver, position and absolute
     altitude are the XMP's, since it is they that have those sigmas; and so they are where EXIF has none. 0, 0 is what
@@ -57,25 +57,21 @@ def read_metadata(data: bytes) -> Metadata:
     is; it is taken as one sigma.
     """
     problems: list[str] = []
-    base: dict[int, Any] = {}
-    detail: dict[int, Any] = {}
-    gps: dict[int, Any] = {}
-    packet: Any = None
+    tags = Tags()
     with warnings.catch_warnings(record=True) as complaints:
         warnings.simplefilter("always")
         try:
-            exif, packet = _containers(data)
-            base, detail = dict(exif), dict(exif.get_ifd(ExifTags.IFD.Exif))
-            gps = dict(exif.get_ifd(ExifTags.IFD.GPSInfo))
+            tags = read_tags(data)
         except BROKEN as error:
             problems.append(f"EXIF is broken ({error})")
     problems += [f"EXIF is broken ({str(c.message).strip()})" for c in complaints if issubclass(c.category, UserWarning)][:1]
     properties: dict[tuple[str, str], str] = {}
-    if packet:
+    if tags.xmp:
         try:
-            properties = parse_xmp(packet)
+            properties = parse_xmp(tags.xmp)
         except ValueError as error:
             problems.append(str(error))
+    base, detail, gps = tags.base, tags.exposure, tags.gps
     exif_height = _height(gps)
     focal_plane = _number(detail.get(ExifTags.Base.FocalPlaneXResolution))
     unit = _number(detail.get(ExifTags.Base.FocalPlaneResolutionUnit)) or 2
@@ -113,7 +109,9 @@ def focal_pixels(metadata: Metadata, width: int, height: int) -> float | None:
         equivalent = metadata.focal_length_35mm * diagonal / _DIAGONAL_35MM
     if metadata.focal_plane and metadata.focal_length:
         side = metadata.exif_side or long  # a photograph made smaller keeps the pitch of the original
-        pixels = metadata.focal_length * metadata.focal_plane * long / side
+        # A RAW may show a little more than the JPG that the pitch is told of.
+        scale = long / side if abs(long / side - 1.0) > _CUT else 1.0
+        pixels = metadata.focal_length * metadata.focal_plane * scale
         sensor = side / metadata.focal_plane
         if _SENSORS[0] < sensor < _SENSORS[1] and (equivalent is None or 0.8 < pixels / equivalent < 1.25):
             return pixels
@@ -128,18 +126,6 @@ def camera_name(metadata: Metadata, width: int, height: int) -> str:
     if width and height:
         parts.append(f"{width} x {height}")
     return ", ".join(parts)
-
-
-def _containers(data: bytes) -> tuple[Image.Exif, Any]:
-    """Return the EXIF and the XMP packet (or None) of a file."""
-    if data.startswith(_TIFF_HEADS):
-        exif = Image.Exif()
-        exif.load_from_fp(io.BytesIO(data))
-        return exif, exif.get(ExifTags.Base.XMLPacket)
-    if data.startswith((b"\xff\xd8", b"\x89PNG")):
-        with Image.open(io.BytesIO(data)) as image:
-            return image.getexif(), image.info.get("xmp") or image.info.get("XML:com.adobe.xmp")
-    return Image.Exif(), None
 
 
 def _position(gps: dict[int, Any], exif_height: float | None, xmp: dict[tuple[str, str], str]) -> Position | None:

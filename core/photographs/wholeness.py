@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .containers import boxes
 from .raw import RawPhotograph, decode_raw
 from .tiffs import is_tiff, pictures
 
@@ -65,15 +66,9 @@ def _require_length(data: bytes) -> None:
         numbers = [int.from_bytes(data[place : place + 4], "big") for place in range(84, 108, 4)]
         ends = [numbers[i] + numbers[i + 1] for i in (0, 2, 4)]
     elif data[4:8] == b"ftyp":
-        ends, place = [], 0
-        while place + 8 <= len(data):
-            size = int.from_bytes(data[place : place + 4], "big")
-            if size == 1:
-                size = int.from_bytes(data[place + 8 : place + 16], "big")
-            if size < 8:  # 0: to the end of the file
-                break
-            place += size
-            ends.append(place)
+        for _ in boxes(data):  # raises when one ends beyond the file
+            pass
+        return
     else:
         return
     missing = max(ends, default=0) - len(data)
