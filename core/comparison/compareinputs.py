@@ -18,8 +18,10 @@ from ..progress import SILENT, Progress
 from ..tiepoints.tiepoints import CACHE
 from ..vector import check_destination, write_layer
 from .cases import Outcome, Settings, run_case
+from .comparisonreport import write_report
 from .control import check, raw_request
 from .exposures import Exposures, find_exposures, survey_crs, write_survey
+from .verdict import verdict
 
 _BYTES_PER_PIXEL = 3  # that a survey takes of the disk beside the photographs: an enhanced image, features and matches
 
@@ -101,11 +103,14 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         exposures = find_exposures(
             Path(request.jpg), Path(request.raw) if request.raw else None, folder, progress.part(0.0, 0.05)
         )
-        for note in (*exposures.notes, *exposures.jpg.notes, *(exposures.raw.notes if exposures.raw else ())):
+        notes = [*exposures.notes, *exposures.jpg.notes, *(exposures.raw.notes if exposures.raw else ())]
+        for note in notes:
             progress.warn(note)
         outcomes = _run_cases(request, exposures, settings, control, folder, progress.part(0.05, 0.97))
         if request.table:
             write_table(request.table, outcomes)
+        write_report(folder / "report" / "compareinputs.html", request.output_html_file, outcomes, settings, notes)
+        progress.info(verdict(outcomes))
         result = _result(outcomes)
     progress.at(1.0)
     return result
