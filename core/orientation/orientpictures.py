@@ -11,7 +11,7 @@ import pycolmap
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..report.cloud import Cloud, cloud_from_above, cloud_in_perspective, exaggeration, levelled
+from ..report.cloud import Cloud, cloud_from_above, cloud_in_perspective, levelled
 from ..report.drawing import draw_tie_points
 from ..report.html import Report, new_figure
 from ..survey import Survey
@@ -153,7 +153,11 @@ def draw_rays(report: Report, rays: NDArray[np.int64], found: Observations) -> N
     right.set_ylim(0, 1.25 * max(1, int(upper.max())))
     right.legend(fontsize=7, ncols=4, loc="upper center")
     figure.tight_layout()
-    report.figure(figure, "Rays of the points kept, in the block and in each photograph. Two rays cannot show a wrong match.")
+    report.figure(
+        figure,
+        "Rays of the points kept, in the block and in each photograph. "
+        "Two rays cannot show a match that is wrong along the epipolar line.",
+    )
 
 
 def draw_block(report: Report, model: pycolmap.Reconstruction) -> None:
@@ -168,17 +172,9 @@ def draw_block(report: Report, model: pycolmap.Reconstruction) -> None:
     xyz, centres = levelled(xyz, centres, turns[:, 2])
     cloud = {"": Cloud(xyz, np.array([p.track.length() for p in points], np.int64), centres)}
     told = "Triangles: the photographs."
-    report.figure(
-        cloud_in_perspective(cloud, unit=_UNIT),
-        f"The tie points in perspective, {_times(exaggeration(cloud))}. {told}",
-        dense=True,
-    )
+    report.figure(cloud_in_perspective(cloud, unit=_UNIT), f"The tie points in perspective. {told}", dense=True)
     report.figure(cloud_from_above(cloud, unit=_UNIT), f"From above, against the mean viewing direction. {told}", dense=True)
     report.figure(cloud_from_above(cloud, unit=_UNIT, colour="rays"), f"From above, by rays. {told}", dense=True)
-
-
-def _times(factor: float) -> str:
-    return "heights as they are" if factor == 1 else f"heights {factor:g} times exaggerated"
 
 
 def draw_barest(report: Report, survey: Survey, seen: Sequence[Sightings], cells: NDArray[np.int64]) -> None:

@@ -25,6 +25,7 @@ _OUTLIERS = 0.003  # share of points beyond each side of the frame
 _RELIEF = 0.25  # of the shorter side: how high heights should look
 _GRID = 160  # cells of the surface that gives points their light, along the longer side
 _AZIMUTH, _ALTITUDE = -65.0, 28.0  # degrees, where the eye of the perspective is
+_LONG = 0.35  # height over width below which panels stand one below the other
 _DISTANCE = 2.4  # of the eye, in diagonals of the block
 _SAND = ("#22577a", "#6f9aa0", "#e6d6a6", "#d0a665", "#96683c")  # from low to high
 _RAYS = ("#d7301f", "#fdae61", "#74add1", "#313695")  # 2, 3, 4, 5 and more
@@ -100,7 +101,7 @@ def cloud_from_above(
         else:
             colours = _colours(points[:, 2], frame, _light(points, frame, 1.0))
         axes.scatter(points[:, 0], points[:, 1], c=colours, s=size, linewidths=0)
-        axes.plot(*cloud.centres[:, :2].T, "^", color="black", markersize=5, markeredgecolor="white", markeredgewidth=0.6)
+        _draw_photographs(axes, cloud.centres)
     if colour == "rays":
         _ray_legend(panels[0])
     else:
@@ -111,13 +112,14 @@ def cloud_from_above(
 def cloud_in_perspective(clouds: Mapping[str, Cloud | None], *, unit: str = "m") -> Figure:
     """Return a figure of clouds in perspective, coloured by height and lit from the upper left; None is a case without a cloud.
 
-    Heights of the ground are multiplied by ``exaggeration(clouds)``, which is written into the figure; the photographs
-    (triangles) float at their true height above it.
+    Heights of the ground are multiplied by ``exaggeration(clouds)``. The photographs (triangles) float above it, at their true
+    height or, where that would leave the ground no room, at a tenth to a half of it. The figure tells both.
     """
     frame, factor = _frame(clouds), exaggeration(clouds)
     richest = max(filter(None, clouds.values()), key=lambda cloud: len(cloud.points))
     base = _box(frame, factor)
-    highest = _lifted(richest.centres, frame, factor)
+    lift = _lift(richest, frame)
+    highest = _lifted(richest.centres, frame, factor, lift)
     bounds = _project(np.concatenate([base, highest]), frame, factor)
     low, high = bounds[:, :2].min(axis=0), bounds[:, :2].max(axis=0)
     margin = 0.02 * float((high - low).max())
@@ -130,13 +132,14 @@ def cloud_in_perspective(clouds: Mapping[str, Cloud | None], *, unit: str = "m")
         axes.fill(ring[:, 0], ring[:, 1], color="#f4f1ea", zorder=0)
         axes.plot(ring[:, 0], ring[:, 1], color="#bbb6a8", linewidth=0.8, zorder=0)
         if cloud is not None:
-            _draw_perspective(axes, cloud, frame, factor)
+            _draw_perspective(axes, cloud, frame, factor, lift)
     size = frame.high - frame.low
-    lowest = panels[len(panels) - 1 - (len(panels) - 1) % 2]
+    lowest = max(panels, key=lambda axes: (-axes.get_position().y0, -axes.get_position().x0))
     lowest.text(
         0.0,
         0.0,
-        f"Base {size[0]:.3g} x {size[1]:.3g}, heights over {size[2]:.2g} ({unit}), {_times(factor)}.",
+        f"Base {size[0]:.3g} x {size[1]:.3g}, heights over {size[2]:.2g} ({unit}), {_times(factor)}; "
+        f"photographs at {'their' if lift == 1 else f'{lift:g} of their'} height.",
         fontsize=8,
         color="#555555",
         transform=lowest.transAxes,
@@ -149,7 +152,7 @@ def _times(factor: float) -> str:
     return "not exaggerated" if factor == 1 else f"{factor:g} times exaggerated"
 
 
-def _draw_perspective(axes: Axes, cloud: Cloud, frame: _Frame, factor: float) -> None:
+def _draw_perspective(axes: Axes, cloud: Cloud, frame: _Frame, factor: float, lift: float) -> None:
     points = cloud.points[:: frame.step]
     points = points[np.all((points >= frame.low) & (points <= frame.high), axis=1)]
     light = _light(points, frame, factor)
@@ -158,8 +161,15 @@ def _draw_perspective(axes: Axes, cloud: Cloud, frame: _Frame, factor: float) ->
     near = (np.median(seen[:, 2]) / seen[order, 2]) ** 2 if len(seen) else np.zeros(0)
     colours = _colours(points[order, 2], frame, light[order])
     axes.scatter(seen[order, 0], seen[order, 1], c=colours, s=0.8 * _dot_size(axes, len(points)) * near, linewidths=0, zorder=1)
-    top = _project(_lifted(cloud.centres, frame, factor), frame, factor)
-    axes.plot(top[:, 0], top[:, 1], "^", color="black", markersize=5, markeredgecolor="white", markeredgewidth=0.6, zorder=2)
+    top = _project(_lifted(cloud.centres, frame, factor, lift), frame, factor)
+    _draw_photographs(axes, top)
+
+
+def _draw_photographs(axes: Axes, places: Array) -> None:
+    size = 5.0 if len(places) <= 100 else 3.0
+    axes.plot(
+        places[:, 0], places[:, 1], "^", color="black", markersize=size, markeredgecolor="white", markeredgewidth=0.12 * size
+    )
 
 
 def _frame(clouds: Mapping[str, Cloud | None]) -> _Frame:
@@ -205,10 +215,18 @@ def _raised(points: Array, frame: _Frame, factor: float) -> Array:
     return np.column_stack([points[:, :2], frame.low[2] + factor * (points[:, 2] - frame.low[2])])
 
 
-def _lifted(centres: Array, frame: _Frame, factor: float) -> Array:
-    """Return photographs at their true height above the middle of the exaggerated ground."""
-    middle = (frame.low[2] + frame.high[2]) / 2
-    return centres + [0, 0, (factor - 1.0) * (middle - frame.low[2])]
+def _lift(cloud: Cloud, frame: _Frame) -> float:
+    """Return the round fraction of their height, up to 1, at which the photographs float a third of the ground's length above."""
+    size = frame.high - frame.low
+    height = float(np.median(cloud.centres[:, 2])) - float(frame.low[2] + frame.high[2]) / 2
+    return min((m for m in (0.1, 0.2, 0.5, 1.0) if m * height > 0.3 * size[:2].max()), default=1.0)
+
+
+def _lifted(centres: Array, frame: _Frame, factor: float, lift: float) -> Array:
+    """Return photographs at ``lift`` times their height above the middle of the exaggerated ground."""
+    middle = float(frame.low[2] + frame.high[2]) / 2
+    height = frame.low[2] + factor * (middle - frame.low[2]) + lift * (centres[:, 2] - middle)
+    return np.column_stack([centres[:, :2], height])
 
 
 def _box(frame: _Frame, factor: float) -> Array:
@@ -232,8 +250,8 @@ def _project(points: Array, frame: _Frame, factor: float) -> Array:
 
 
 def _panels(clouds: Mapping[str, Cloud | None], aspect: float) -> tuple[Figure, list[Axes]]:
-    """Return a figure with one panel a cloud, two in a row; ``aspect`` is a panel's height over its width."""
-    columns = min(2, len(clouds))
+    """Return a figure with a panel a cloud, two in a row unless they are long; ``aspect`` is a panel's height over its width."""
+    columns = min(2, len(clouds)) if aspect > _LONG else 1
     rows = -(-len(clouds) // columns)
     width = 8.6 / columns
     figure = new_figure(9.4, float(rows * (np.clip(width * aspect, 1.2, 8.0) + 0.45)) + 0.3)

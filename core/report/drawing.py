@@ -58,23 +58,25 @@ def draw_tie_points(
     canvas = picture.astype(np.float32)
     for points, colour in groups:
         if radius >= _LARGEST:  # few dots can afford a rim, which shows them on any ground
-            _blend(canvas, _discs(points, radius + 1.2, (rows, columns)), (20, 20, 20))
+            _blend(canvas, _discs(points, radius + 1.2, 1.0, (rows, columns)), (20, 20, 20))
         strength = min(1.0, (radius / _SMALLEST) ** 2)
-        _blend(canvas, strength * _discs(points, max(radius, _SMALLEST), (rows, columns)), colour)
+        _blend(canvas, _discs(points, max(radius, _SMALLEST), strength, (rows, columns)), colour)
     return np.asarray(np.rint(canvas), np.uint8)
 
 
-def _discs(points: NDArray[np.float64], radius: float, shape: tuple[int, int]) -> NDArray[np.float32]:
-    """Return how far discs about points (n, 2) in the picture cover each pixel, 0 to 1."""
+def _discs(points: NDArray[np.float64], radius: float, strength: float, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Return how far discs about points (n, 2) in the picture hide each pixel, 0 to 1; one alone hides ``strength`` of it."""
     reach = int(np.ceil(radius + 0.5))
-    cover = np.zeros((shape[0] + 2 * reach, shape[1] + 2 * reach), np.float32)
+    # The logarithm of what is left to see: discs one over the other add up.
+    left = np.zeros((shape[0] + 2 * reach, shape[1] + 2 * reach))
     x, y = points.T
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):
             distance = np.hypot(column + dx + 0.5 - x, row + dy + 0.5 - y)
-            np.maximum.at(cover, (row + dy + reach, column + dx + reach), np.clip(radius + 0.5 - distance, 0, 1))
-    return cover[reach : reach + shape[0], reach : reach + shape[1]]
+            hidden = strength * np.clip(radius + 0.5 - distance, 0, 1)
+            np.add.at(left, (row + dy + reach, column + dx + reach), np.log1p(-np.minimum(hidden, 0.999)))
+    return (1.0 - np.exp(left[reach : reach + shape[0], reach : reach + shape[1]])).astype(np.float32)
 
 
 def _blend(canvas: NDArray[np.float32], cover: NDArray[np.float32], colour: tuple[int, int, int]) -> None:

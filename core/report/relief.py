@@ -25,18 +25,21 @@ def hillshade(height: NDArray[np.floating], cell: float | tuple[float, float], e
     return np.clip(light / np.sqrt(1.0 + down**2 + right**2), 0.0, 1.0).astype(np.float32)
 
 
-def exaggeration(height: NDArray[np.floating], cell: float | tuple[float, float], wanted: float = 0.3) -> float:
-    """Return the round factor (1, 2, 5, 10 ... 100) that brings the root mean square slope of a surface near ``wanted``.
+def exaggeration(height: NDArray[np.floating], cell: float | tuple[float, float], wanted: float = 0.5) -> float:
+    """Return the round factor (1, 2, 5, 10 ... 100) that brings the steepest tenth of a surface near the slope ``wanted``.
 
-    A beach is too flat to see without; whoever draws it says the factor.
+    A beach is too flat to see without; whoever draws it says the factor. Slopes count from their median, the beach's own.
     """
     if min(height.shape) < 2:
         return 1.0
     south, east = cell if isinstance(cell, tuple) else (cell, cell)
     down, right = np.gradient(height, south, east)
-    slope = np.hypot(down - np.nanmedian(down), right - np.nanmedian(right)) if np.isfinite(down * right).any() else np.zeros(1)
-    spread = float(np.sqrt(np.nanmean(slope**2)))
-    return round_factor(wanted / spread) if spread > 0 else 1.0
+    known = np.isfinite(down) & np.isfinite(right)
+    if not known.any():
+        return 1.0
+    down, right = down[known], right[known]
+    steep = float(np.quantile(np.hypot(down - np.median(down), right - np.median(right)), 0.9))
+    return round_factor(wanted / steep) if steep > 0 else 1.0
 
 
 def round_factor(value: float, most: float = 100.0) -> float:

@@ -274,6 +274,7 @@ def _draw_histograms(report: Report, ties: _Ties) -> None:
     left.hist(ties.features, bins=edges.tolist(), color="#bbbbbb", label="all")
     left.hist(ties.matched, bins=edges.tolist(), color=_MATCHED, alpha=0.7, label="matched")
     left.set(xlabel="features of a photograph", ylabel="photographs", xlim=(0, edges[-1]))
+    left.yaxis.get_major_locator().set_params(integer=True)
     left.legend(fontsize=8)
     for counts, colour, name in zip(ties.scales, (_OTHERS, _MATCHED), ("in no pair", "matched"), strict=True):
         right.stairs(counts, _SCALES, color=colour, linewidth=1.4, label=name)
