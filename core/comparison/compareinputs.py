@@ -14,6 +14,7 @@ from ..contract import VectorSource
 from ..errors import InputError
 from ..files import remove, scratch
 from ..orientation import georeference
+from ..photographs.enhance import check_window
 from ..progress import SILENT, Progress
 from ..tiepoints.tiepoints import CACHE
 from ..vector import check_destination, write_layer
@@ -178,6 +179,7 @@ def _run_cases(
 ) -> list[Outcome]:
     cases = [case for case in CASES if exposures.raw or not case[1]]
     _require_room(folder, exposures, len(cases))
+    check_window(settings.method, settings.window, exposures.jpg.photographs)
     crs = survey_crs(request.crs, exposures.jpg.photographs)
     surveys = {}
     for name, is_raw, _ in cases:

@@ -59,14 +59,12 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     InputError
         When the request cannot be met, or a photograph has gone, changed, or cannot be decoded.
     """
-    if request.window < 3 or request.window % 2 == 0:
-        raise InputError(f"WINDOW={request.window} is not an odd number from 3 on: take {max(3, request.window | 1)}.")
-    Survey.open(request.survey)  # before a lock is put into a folder that is none
+    survey = Survey.open(request.survey)  # before a lock is put into a folder that is none
+    check_window(request.method, request.window, survey.photographs)
     with held(request.survey, "enhance"):
         survey = Survey.open(request.survey)
         survey.require("createsurvey")
         photographs = list(survey.photographs)
-        _check(request, photographs)
         paths = {p.name: survey.path(p).absolute() for p in photographs}
         outlines = find_outlines(survey, photographs, request.ignore) if request.ignore else None
         shapes = {} if outlines is None else _shapes(outlines, progress)
@@ -112,6 +110,21 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         _remove_strays(folder.parent, {*images.values(), *(mask_path(images[name]) for name in shapes)})
     progress.at(1.0)
     return Result(request.survey)
+
+
+def check_window(method: str, window: int, photographs: Sequence[Photograph]) -> None:
+    """Refuse, before any work, a window that cannot be used on these photographs.
+
+    Raises
+    ------
+    InputError
+        When it is not odd, or larger than a photograph.
+    """
+    if window < 3 or window % 2 == 0:
+        raise InputError(f"WINDOW={window} is not an odd number from 3 on: take {max(3, window | 1)}.")
+    small = [p.name for p in photographs if _window(method, window) and min(p.width, p.height) < window]
+    if small:
+        raise InputError(f"WINDOW={window} is larger than {some(small)}: take a smaller one.")
 
 
 def enhanced_path(survey: Survey, photograph: Photograph) -> Path:
@@ -195,12 +208,6 @@ def _told(photographs: Sequence[Photograph], contrasts: dict[str, Contrast], pro
     text = f"IGNORE covers the whole of {some(covered)}: no tie points will be found there."
     progress.warn(text)
     return [text]
-
-
-def _check(request: Request, photographs: list[Photograph]) -> None:
-    small = [p.name for p in photographs if _window(request.method, request.window) and min(p.width, p.height) < request.window]
-    if small:
-        raise InputError(f"WINDOW={request.window} is larger than {some(small)}: take a smaller one.")
 
 
 def _remove_strays(folder: Path, images: set[Path]) -> None:
