@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..raster import Grid
 from ..report.html import Report, new_figure
+from ..report.relief import exaggeration, heights_drawn, hillshade
 from .coregistration import Shift, Statistics
 from .difference import Outcome
 from .heighterror import HeightError
@@ -74,7 +75,13 @@ def write_report(path: str, findings: Findings) -> None:
         report.warning(warning)
     _volumes(report, f)
     report.heading("Map")
-    report.figure(_map(f), "Change over the relief of BEFORE; red: erosion, blue: deposition. Outlines: zones.")
+    cells = f.outcome.thinning * f.grid.step_north, f.outcome.thinning * f.grid.cell
+    factor = exaggeration(f.outcome.height, cells)
+    report.figure(
+        _map(f, hillshade(f.outcome.height, cells, factor)),
+        f"Change over the relief of BEFORE (light from the north-west, {heights_drawn(factor)}); red: erosion, blue: deposition. "
+        "Outlines: zones.",
+    )
     report.figure(_histogram(f), "Change of all cells, thinned.")
     _stable(report, f)
     report.heading("Inputs")
@@ -194,14 +201,14 @@ def _pairs(values: tuple[float, ...], covariance: Array) -> list[str | None]:
     return told + [None] * (4 - len(told))
 
 
-def _map(f: Findings) -> Any:
+def _map(f: Findings, light: NDArray[np.float32]) -> Any:
     figure = new_figure(9.0, 7.0)
     axes = figure.add_subplot()
     west, south, east, north = f.grid.bounds
     step = f.outcome.thinning
     height, width = f.outcome.change.shape
     box = (west, west + width * step * f.grid.cell, north - height * step * f.grid.step_north, north)
-    axes.imshow(_hillshade(f.outcome.height, f.grid.cell * step), cmap="gray", vmin=0, vmax=1, extent=box)
+    axes.imshow(light, cmap="gray", vmin=0, vmax=1, extent=box)
     limit = _limit(f.outcome.change)
     picture = axes.imshow(f.outcome.change, cmap="RdBu", vmin=-limit, vmax=limit, extent=box, alpha=0.75, interpolation="nearest")
     for zone in f.zones:
@@ -213,17 +220,6 @@ def _map(f: Findings) -> Any:
     axes.tick_params(labelsize=8)
     figure.colorbar(picture, label="change (m)", shrink=0.8)
     return figure
-
-
-def _hillshade(height: Array, step: float) -> Array:
-    """Return the light (0..1) on a surface from the north-west, 45 degrees high; NaN beside holes."""
-    if min(height.shape) < 2:
-        return np.full(height.shape, 0.7)
-    down, right = np.gradient(height, step)
-    spread = np.nanstd(np.hypot(down, right)) if np.isfinite(down).any() else 0.0
-    lift = 0.3 / spread if spread > 0 else 1.0  # a beach is too flat to see without exaggeration
-    east, north = lift * right, -lift * down
-    return np.asarray(np.clip((1.0 + (east - north) / np.sqrt(2)) / np.sqrt(2) / np.sqrt(1 + east**2 + north**2), 0, 1))
 
 
 def _limit(change: Array) -> float:

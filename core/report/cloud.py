@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .html import new_figure
-from .relief import hillshade, round_factor
+from .relief import heights_drawn, hillshade, round_factor
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -138,7 +138,7 @@ def cloud_in_perspective(clouds: Mapping[str, Cloud | None], *, unit: str = "m")
     lowest.text(
         0.0,
         0.0,
-        f"Base {size[0]:.3g} x {size[1]:.3g}, heights over {size[2]:.2g} ({unit}), {_times(factor)}; "
+        f"Base {size[0]:.3g} x {size[1]:.3g}, relief {size[2]:.2g} ({unit}); {heights_drawn(factor)}; "
         f"photographs at {'their' if lift == 1 else f'{lift:g} of their'} height.",
         fontsize=8,
         color="#555555",
@@ -146,10 +146,6 @@ def cloud_in_perspective(clouds: Mapping[str, Cloud | None], *, unit: str = "m")
     )
     _height_bar(figure, panels, frame, unit)
     return figure
-
-
-def _times(factor: float) -> str:
-    return "not exaggerated" if factor == 1 else f"{factor:g} times exaggerated"
 
 
 def _draw_perspective(axes: Axes, cloud: Cloud, frame: _Frame, factor: float, lift: float) -> None:
@@ -262,8 +258,8 @@ def _panels(clouds: Mapping[str, Cloud | None], aspect: float) -> tuple[Figure, 
 
 
 def _title(name: str, cloud: Cloud | None) -> str:
-    told = "not oriented" if cloud is None else f"{len(cloud.points):,} points"
-    return f"{name}: {told}" if name else told
+    count = "not oriented" if cloud is None else f"{len(cloud.points):,} points"
+    return f"{name}: {count}" if name else count
 
 
 def _dot_size(axes: Axes, count: int) -> float:

@@ -42,6 +42,11 @@ def exaggeration(height: NDArray[np.floating], cell: float | tuple[float, float]
     return round_factor(wanted / steep) if steep > 0 else 1.0
 
 
+def heights_drawn(factor: float) -> str:
+    """Return in words what is done to heights."""
+    return "heights as they are" if factor == 1 else f"heights {factor:g} times exaggerated"
+
+
 def round_factor(value: float, most: float = 100.0) -> float:
     """Return the largest of 1, 2, 5, 10, 20 ... ``most`` that does not exceed ``value``, and 1 at least."""
     steps = [m * 10.0**e for e in range(4) for m in (1, 2, 5)]

@@ -11,6 +11,7 @@ from PIL import Image
 
 from ..block import View
 from ..report.html import Report, new_figure
+from ..report.relief import exaggeration, heights_drawn, hillshade
 from .flight import Plan, expected_precision
 from .ground import Targets
 from .terrain import ZONES, Beach
@@ -81,7 +82,7 @@ def write_report(
         "holds for single points and counts no error of orientation or control."
     )
     report.heading("The terrain")
-    report.figure(_terrain(beach, len(flights)), "Hillshade of the true surfaces, the ripples included; the sea is flat.")
+    report.figure(*_terrain(beach, len(flights)))
     if volumes:
         report.heading("The truth")
         report.figure(_difference(beach), "True difference, after minus before, and the zones.")
@@ -111,18 +112,19 @@ def _plan(beach: Beach, views: list[View], targets: Targets, a: Array, c: Array,
     return figure
 
 
-def _terrain(beach: Beach, dates: int) -> Any:
+def _terrain(beach: Beach, dates: int) -> tuple[Any, str]:
     figure = new_figure(9, 4.6 * dates)
     a, c = _mesh(beach)
+    # A hillshade's rows run to the south, which is the land here.
+    heights = [beach.heights(a[None], c[::-1, None], k == 1) for k in range(dates)]
+    step = float(a[1] - a[0])
+    factor = exaggeration(heights[0], step)
     for k in range(dates):
         axes = figure.add_subplot(dates, 1, k + 1)
-        z = beach.heights(a[None], c[:, None], k == 1)
-        slope_c, slope_a = np.gradient(z, c, a)
-        light = (0.7 - 0.5 * slope_a - 0.5 * slope_c) / np.sqrt(1 + slope_a**2 + slope_c**2)
-        axes.imshow(light, cmap="gray", vmin=0.35, vmax=1.05, origin="lower", extent=_extent(beach))
+        axes.imshow(hillshade(heights[k], step, factor), cmap="gray", vmin=0, vmax=1, extent=_extent(beach))
         axes.set(xlabel="along the shore (m)", ylabel="towards the sea (m)", title=("before", "after")[k])
     figure.tight_layout()
-    return figure
+    return figure, f"Hillshade of the true surfaces, the ripples included, {heights_drawn(factor)}; the sea is flat."
 
 
 def _difference(beach: Beach) -> Any:

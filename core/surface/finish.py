@@ -40,7 +40,6 @@ class Summary:
     mean_score: float | None
     thinning: int
     height: Floats
-    shade: NDArray[np.uint8]
     score: Floats
     sigma: Floats
     colour: NDArray[np.uint8]
@@ -101,9 +100,6 @@ def finish(
             sigma = np.where(good, mosaic.read("sigma", *wide), np.nan).astype(np.float32)
             height, sigma, filled = fill(height, sigma, good, most)
             valid = (good | filled)[core]
-            around = height.copy()
-            around[~(good | filled)] = np.nan
-            shade = hillshade(around, grid.cell)[core]
             height, sigma, filled = height[core], sigma[core], filled[core]
             wanted = inside(area, grid.window(column, row, columns, rows)) if area else np.ones((rows, columns), bool)
             ignored = inside(ignore, grid.window(column, row, columns, rows))
@@ -128,7 +124,7 @@ def finish(
                 writer.write(Patch(column, row, layers[name]))
             if cloud is not None:
                 cloud.write(column, row, height, colour)
-            thumbs.put(row, column, height, np.where(valid, shade, 0), np.where(valid, score, np.nan), sigma, colour)
+            thumbs.put(row, column, height, np.where(valid, score, np.nan), sigma, colour)
             covered += int((mosaic.read("covered", row, column, rows, columns) & wanted & ~ignored).sum())
             cells += int(valid.sum())
             filled_cells += int(filled.sum())
@@ -176,17 +172,6 @@ def inside(shapes: list[Any], window: Grid) -> NDArray[np.bool_]:
     return out
 
 
-def hillshade(height: Floats, cell: float) -> NDArray[np.uint8]:
-    """Return the light (1 to 255) on a surface from the north-west, 40 degrees high; 0 beside holes."""
-    if min(height.shape) < 2:
-        return np.zeros(height.shape, np.uint8)
-    down, right = np.gradient(height, cell)
-    azimuth, altitude = np.radians(315.0), np.radians(40.0)
-    light = -right * np.sin(azimuth) * np.cos(altitude) + down * np.cos(azimuth) * np.cos(altitude) + np.sin(altitude)
-    light = light / np.sqrt(1.0 + down**2 + right**2)
-    return np.where(np.isnan(light), 0, np.clip(254 * light, 0, 254) + 1).astype(np.uint8)
-
-
 def _median(histogram: NDArray[np.int64]) -> float | None:
     total = int(histogram.sum())
     if not total:
@@ -200,22 +185,19 @@ class _Thumbnails:
         rows, columns = -(-grid.height // thinning), -(-grid.width // thinning)
         self._step = thinning
         self._numbers = {name: np.full((rows, columns), np.nan, np.float32) for name in ("height", "score", "sigma")}
-        self._pictures = {"shade": np.zeros((rows, columns), np.uint8), "colour": np.zeros((rows, columns, 4), np.uint8)}
+        self._colour = np.zeros((rows, columns, 4), np.uint8)
 
-    def put(
-        self, row: int, column: int, height: Floats, shade: NDArray[Any], score: Floats, sigma: Floats, colour: NDArray[np.uint8]
-    ) -> None:
+    def put(self, row: int, column: int, height: Floats, score: Floats, sigma: Floats, colour: NDArray[np.uint8]) -> None:
         s = self._step
         first = -row % s, -column % s
         r, c = (row + first[0]) // s, (column + first[1]) // s
         if s > 1:
-            shade, colour = cv2.blur(shade, (s, s)), cv2.blur(colour, (s, s))
+            colour = cv2.blur(colour, (s, s))
         for name, layer in (("height", height), ("score", score), ("sigma", sigma)):
             thin = layer[first[0] :: s, first[1] :: s]
             self._numbers[name][r : r + thin.shape[0], c : c + thin.shape[1]] = thin
-        for name, picture in (("shade", shade), ("colour", colour)):
-            part = picture[first[0] :: s, first[1] :: s]
-            self._pictures[name][r : r + part.shape[0], c : c + part.shape[1]] = part
+        part = colour[first[0] :: s, first[1] :: s]
+        self._colour[r : r + part.shape[0], c : c + part.shape[1]] = part
 
     def layers(self) -> dict[str, Any]:
-        return {**self._numbers, **self._pictures}
+        return {**self._numbers, "colour": self._colour}

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..report.html import Report, new_figure
+from ..report.relief import exaggeration, heights_drawn, hillshade
 from .finish import Summary
 from .plan import Plan
 
@@ -31,7 +32,14 @@ def write_page(path: Path, copy: str | None, plan: Plan, summary: Summary, param
             "not invented; the map of the correlation tells which photographs disagree where."
         )
     report.heading("Surface")
-    report.picture(_over(summary.shade[..., None], summary.shade > 0), "Light from the north-west. White: no height.")
+    cell = plan.grid.cell * summary.thinning
+    factor = exaggeration(summary.height, cell)
+    light = hillshade(summary.height, cell, factor)
+    seen = np.isfinite(light)
+    report.picture(
+        _over(np.where(seen, 255 * light, 0).astype(np.uint8)[..., None], seen),
+        f"Light from the north-west, {heights_drawn(factor)}. White: no height.",
+    )
     report.picture(_over(summary.colour[..., :3], summary.colour[..., 3] > 0), "Orthophoto.")
     report.figure(_map(plan, summary.height, "terrain", "height (m)", 0.5), "Height.")
     report.heading("Trust")

@@ -159,7 +159,7 @@ def test_cases_are_drawn_in_the_frame_of_the_richest():
         assert [a.get_title() for a in axes] == ["JPG: not oriented", "RAW: 50 points", "CeRAW: 5,000 points"]
         assert len({(a.get_xlim(), a.get_ylim()) for a in axes}) == 1
     texts = [t.get_text() for a in cloud_in_perspective(clouds).axes for t in a.texts]
-    assert any("heights over 1.2 (m), 2 times exaggerated" in t for t in texts)
+    assert any("relief 1.2 (m); heights 2 times exaggerated" in t for t in texts)
 
 
 def test_a_cloud_from_above_by_rays_names_them():
