@@ -75,7 +75,8 @@ def unmasked(outline: Any, width: int, height: int) -> NDArray[np.bool_]:
 
 def _polygons(geometry: Any) -> list[Any]:
     """Return the polygons among the parts of a geometry, which may be collections themselves."""
-    return [part for part in shapely.get_parts(shapely.get_parts(geometry)) if shapely.get_type_id(part) == 3]
+    parts = shapely.get_parts(shapely.get_parts(geometry))
+    return [part for part in parts if shapely.get_type_id(part) == 3 and not shapely.is_empty(part)]
 
 
 def _before_camera(view: View, polygon: Any, heights: Heights) -> Any | None:
@@ -102,11 +103,12 @@ def _cut(ring: Array, near: float) -> Array:
 
 
 def _frame(camera: Camera) -> Array:
-    """Return the photograph's border (n, 2) in the plane at unit distance."""
+    """Return the photograph's border (n, 2) in the plane at unit distance, where the lens model reaches it."""
     along, zero = np.linspace(0.0, 1.0, _BORDER), np.zeros(_BORDER)
     sides = [np.column_stack(pair) for pair in ((along, zero), (along, zero + 1), (zero, along), (zero + 1, along))]
-    uv = camera.unproject(np.concatenate(sides) * (camera.width, camera.height))[:, :2]
-    return np.asarray(uv[np.isfinite(uv).all(axis=1)])
+    pixels = np.concatenate(sides) * (camera.width, camera.height)
+    rays = camera.unproject(pixels)
+    return np.asarray(rays[np.abs(camera.project(rays) - pixels).max(axis=1) < 0.5, :2])
 
 
 def _reach(view: View, frame: Array) -> float:

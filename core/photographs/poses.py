@@ -206,5 +206,5 @@ def _georeferenced_note(survey: Survey, georef: Georef, views: dict[str, View], 
         text += f"; ground points were {check:.3f} m off in it"
     offsets = [o for p in photographs if p.name in views and (o := _offset(views[p.name], p, georef.frame)) is not None]
     if stale and offsets:
-        text += f"; its poses lie {np.median(offsets):.2f} m from the photographs' GNSS positions, in the median"
+        text += f"; its poses lie {np.median(offsets):.2f} m from the GNSS positions, in the median"
     return text + "."

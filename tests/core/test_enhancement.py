@@ -1,6 +1,7 @@
 """The filter itself, against hand-computed numbers and a brute-force reference."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from strandline.core.photographs.enhancement import (
     noise_floor,
     pixel_noise,
     reflected,
+    usable,
 )
 from strandline.core.photographs.reading import channel_sum, mean_level
 
@@ -19,14 +21,18 @@ def grey(values, dtype=np.uint8):
     return channel_sum(np.array(values, dtype))
 
 
-def reference(values, window, floor, mode):
-    """Local contrast in (-1, 1) with every window summed on its own, in float64."""
+def reference(values, window, floor, mode, valid=None):
+    """Local contrast in (-1, 1) with every window summed on its own, in float64; NaN where a quarter of it is not valid."""
     half = window // 2
     padded = np.pad(values.astype(float), half, mode=mode)
-    out = np.empty(values.shape)
+    there = np.pad(np.ones(values.shape, bool) if valid is None else valid, half, mode=mode)
+    out = np.full(values.shape, np.nan)
     for r in range(values.shape[0]):
         for c in range(values.shape[1]):
-            w = padded[r : r + window, c : c + window]
+            m = there[r : r + window, c : c + window]
+            if m.mean() < 0.25 or not there[r + half, c + half]:
+                continue
+            w = padded[r : r + window, c : c + window][m]
             sigma = max(math.sqrt(np.mean((w - w.mean()) ** 2)), floor)
             out[r, c] = math.atan((values[r, c] - w.mean()) / sigma) / (math.pi / 2)
     return out
@@ -51,36 +57,150 @@ def test_the_floor_holds_where_the_window_is_flatter():
     assert out[2, 2] == math.floor(127.5 + 127.5 * 1.058407 / 1.570796 + 0.5) == 213
     assert noise_floor(1) == 1.0
     assert noise_floor(3) == pytest.approx(1.7320508)
+    assert noise_floor(3, 16.0) == pytest.approx(27.712813)
     assert contrast.below_percent == 100.0
 
 
-@pytest.mark.parametrize(("dtype", "top", "channels"), [(np.uint8, 256, 1), (np.uint8, 256, 3), (np.uint16, 65536, 3)])
-def test_arctan_against_brute_force(dtype, top, channels):
-    rng = np.random.default_rng(1)
-    pixels = rng.integers(0, top, (23, 31, channels)).astype(dtype)
+def sand(bits, channels=3, shape=(37, 45), seed=1):
+    """Dim sand with 2 % of contrast beside a field of everything from black to white, as a camera of ``bits`` has it."""
+    rng = np.random.default_rng(seed)
+    white = 2**bits - 1
+    pixels = rng.normal(0.3, 0.006, (*shape, channels)) * white
+    pixels[:, : shape[1] // 3] = rng.uniform(0, white, (shape[0], shape[1] // 3, channels))
+    return pixels.round().clip(0, white).astype(np.uint8 if bits == 8 else np.uint16)
+
+
+def a_mask(shape):
+    """A corner, a hole, and a region that leaves a narrow tongue of pixels whose windows are mostly masked."""
+    valid = np.ones(shape, bool)
+    valid[:20, :11] = False
+    valid[25:29, 30:36] = False
+    valid[:, -9:] = False
+    valid[18, -9:] = True
+    return valid
+
+
+@pytest.mark.parametrize("masked", [False, True])
+@pytest.mark.parametrize("window", [3, 11, 25, 37])
+@pytest.mark.parametrize(("bits", "channels"), [(8, 1), (8, 3), (12, 3), (16, 3)])
+def test_arctan_against_brute_force(bits, channels, window, masked):
+    pixels = sand(bits, channels)
     total = channel_sum(pixels)
-    expected = 127.5 + 127.5 * reference(pixels.sum(2, dtype=np.int64), 11, math.sqrt(channels), "symmetric")
-    out, _ = enhance_photograph(total, "arctan", 11)
+    valid = a_mask(total.values.shape) if masked else None
+    local = reference(total.values, window, math.sqrt(channels), "symmetric", valid)
+    out, contrast = enhance_photograph(total, "arctan", window, valid)
+    defined = ~np.isnan(local)
     # Half a level of rounding, and the polynomial's 2e-5.
-    assert np.abs(out - expected).max() < 0.5 + 1e-4
+    assert np.abs(out - (127.5 + 127.5 * local))[defined].max() < 0.5 + 1e-4
+    assert (out[~defined] == 128).all()
+    if masked:
+        assert (usable(valid, "arctan", window) == defined).all()
+        assert contrast.masked_percent == pytest.approx(100 * (~defined).mean())
+        if window == 11:  # the windows of the tongue's end
+            assert (~defined).sum() > (~valid).sum()
 
 
-def test_micmac_against_brute_force():
-    rng = np.random.default_rng(2)
-    pixels = rng.integers(0, 200, (20, 26, 3)).astype(np.uint8)
-    total = channel_sum(pixels)
-    values = pixels.sum(2, dtype=np.int64)
-    flat = np.sort(values.ravel())
-    levels, counts = np.unique(flat, return_counts=True)
-    share = {v: (flat <= v).mean() for v in levels}
+def micmac_reference(values, window, floor, valid=None):
+    """What MicMac's formula gives, unrounded, with 65,536 bins from 0 to the largest value."""
+    chosen = values[valid] if valid is not None else values.ravel()
+    bins = chosen.astype(np.int64) * 65536 // (int(chosen.max()) + 1)
+    levels, counts = np.unique(bins, return_counts=True)
+    share = {v: (bins <= v).mean() for v in levels}
     roots = {v: np.sqrt(counts[levels <= v]).sum() / np.sqrt(counts).sum() for v in levels}
-    tone = np.vectorize(lambda v: 255 * (share[v] + 2 * v / flat[-1] + 3 * roots[v]) / 6)(values)
-    margin = np.minimum(64, np.minimum(tone, 255 - tone))
-    expected = tone + margin * reference(values, 5, math.sqrt(3), "edge")
-    out, _ = enhance_photograph(total, "micmac", 5)
-    difference = expected - out  # truncated, not rounded
+
+    def tone(v):
+        b = int(v) * 65536 // (int(chosen.max()) + 1)
+        return 255 * (share[b] + 2 * v / chosen.max() + 3 * roots[b]) / 6
+
+    tones = np.array([tone(v) if b else np.nan for v, b in zip(values.ravel(), np.isin(values, chosen).ravel(), strict=True)])
+    tones = tones.reshape(values.shape)
+    margin = np.minimum(64, np.minimum(tones, 255 - tones))
+    return tones + margin * reference(values, window, floor, "edge", valid)
+
+
+@pytest.mark.parametrize("masked", [False, True])
+@pytest.mark.parametrize(("bits", "window"), [(8, 5), (12, 11), (16, 25)])
+def test_micmac_against_brute_force(bits, window, masked):
+    total = channel_sum(sand(bits))
+    valid = a_mask(total.values.shape) if masked else None
+    expected = micmac_reference(total.values, window, math.sqrt(3), valid)
+    out, _ = enhance_photograph(total, "micmac", window, valid)
+    defined = ~np.isnan(expected)
+    difference = (expected - out)[defined]  # truncated, not rounded
     assert difference.min() > -1e-3
     assert difference.max() < 1 + 1e-3
+    assert (out[~defined] == 128).all()
+
+
+def test_micmac_by_hand():
+    # One 9 among twenty-four 0 in a window of 3. Tone of 0: H = 24/25, L = 0, S = sqrt(24) / (sqrt(24) + 1) = 0.8304810, so
+    # 255 (0.96 + 2.4914430) / 6 = 146.6863; margin 64. Tone of 9: 255 (1 + 2 + 3) / 6 = 255; margin 0.
+    # Beside the 9: mean 1, variance 8, z = -1 / sqrt(8), 2/pi atan z = -0.2163468: 146.6863 - 64 * 0.2163468 = 132.84.
+    values = np.zeros((5, 5), np.uint8)
+    values[2, 2] = 9
+    out, _ = enhance_photograph(grey(values), "micmac", 3)
+    assert out[2, 2] == 255
+    assert (out[1:4, 1:4].ravel()[[0, 1, 2, 3, 5, 6, 7, 8]] == 132).all()
+    assert (out[0] == 146).all()
+    assert (out[:, 4] == 146).all()
+
+
+def test_masked_pixels_enter_nothing():
+    # What stands under the mask makes no difference, by any method.
+    pixels, valid = sand(12), a_mask((37, 45))
+    others = np.where(valid[:, :, None], pixels, np.uint16(4095))
+    for method in ("arctan", "micmac", "equalize", "none"):
+        results = [enhance_photograph(channel_sum(p), method, 11, valid) for p in (pixels, others)]
+        assert (results[0][0] == results[1][0]).all()
+        assert results[0][1] == results[1][1]
+        assert (results[0][0][~valid] == 128).all()
+
+
+def test_a_window_by_hand_with_a_mask():
+    # A window of 3 in which five pixels are left: 0, 0, 0, 0 and 10 in the middle: mean 2, variance 100/5 - 4 = 16, z = 2.
+    # atan(2) = 1.1071487, which is 0.7048328 of a right angle.
+    values, valid = np.zeros((3, 3), np.uint8), np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], bool)
+    values[1, 1] = 10
+    values[~valid] = 200
+    out, contrast = enhance_photograph(grey(values), "arctan", 3, valid)
+    assert out[1, 1] == math.floor(127.5 + 127.5 * 0.7048328 + 0.5) == 217
+    assert (out[~valid] == 128).all()
+    assert contrast.masked_percent == pytest.approx(100 * 4 / 9)
+
+
+def test_a_quarter_of_the_window_must_be_left():
+    valid = np.zeros((9, 9), bool)
+    valid[4, 4] = True
+    assert not usable(valid, "arctan", 3).any()  # 1 of 9 is left
+    valid[4, 5] = valid[5, 4] = True
+    assert usable(valid, "arctan", 3).sum() == 3  # 3 of 9 in all three windows
+    assert (usable(valid, "none", 3) == valid).all()
+
+
+def test_all_masked():
+    for method in ("arctan", "micmac", "equalize", "none"):
+        out, contrast = enhance_photograph(channel_sum(sand(8)), method, 11, np.zeros((37, 45), bool))
+        assert (out == 128).all()
+        assert (contrast.masked_percent, contrast.noise, contrast.mean_sigma) == (100.0, 0.0, None)
+
+
+def test_equalize_counts_unmasked_pixels_only():
+    values, valid = np.array([[0, 0, 3], [3, 3, 7]], np.uint8), np.array([[1, 0, 1], [1, 0, 1]], bool)
+    out, _ = enhance_photograph(grey(values), "equalize", 3, valid)
+    assert out.tolist() == [[64, 128, 191], [191, 128, 255]]  # 255 times 1/4, 3/4, 1, rounded
+
+
+def test_the_noise_floor_follows_the_step():
+    # 12 bits spread over 16: one DN of the file is 16 in the values, and so is the floor.
+    pixels = sand(12)
+    coarse = replace(channel_sum(pixels * 16), step=16.0)
+    first, told = enhance_photograph(channel_sum(pixels), "arctan", 11)
+    second, spread = enhance_photograph(coarse, "arctan", 11)
+    assert (first == second).all()
+    assert spread.noise == pytest.approx(told.noise)
+    assert spread.mean_sigma == pytest.approx(told.mean_sigma)
+    assert spread.floor == told.floor == pytest.approx(math.sqrt(3))
+    assert (told.levels, spread.levels) == (65535.0, 65535.0 / 16)
 
 
 def test_micmac_tables_by_hand():
