@@ -1,4 +1,4 @@
-"""The skeleton of TIFF files and of RAW files that are built like them: where the pixels should lie."""
+"""The skeleton of TIFF files and of RAW files that are built like them: where the pixels should lie, and which count."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 # Olympus (IIRO, IIRS, MMOR) and Panasonic (IIU) write other numbers where TIFF has 42.
 _HEADS = (b"II*\0", b"MM\0*", b"IIRO", b"IIRS", b"MMOR", b"IIU\0")
-_FORMATS = {1: "B", 3: "H", 4: "I", 13: "I"}  # of the types that offsets and counts may have
+_RATIONAL = "II"
+_FORMATS = {1: "B", 3: "H", 4: "I", 5: _RATIONAL, 13: "I"}  # of the types of TIFF that are used here
 _SUB_IFDS = 330
 _PIXELS = ((273, 279), (324, 325), (513, 514))  # strips, tiles, a JPG: tags of their offsets and lengths
-_MOST = 10_000_000  # strips or tiles, more than any file has
+_CROP_ORIGIN, _CROP_SIZE, _ACTIVE = 50719, 50720, 50829
+_MOST = 1_000_000  # strips or tiles, more than any file has
 _UNUSED = 0xFFFFFFFF  # what Panasonic writes as the offset of its one strip
 
 
@@ -39,27 +41,53 @@ def pictures(data: bytes) -> list[list[Part]]:
     Raises
     ------
     ValueError
-        When a directory lies beyond the end of the file.
+        When the list of parts lies beyond the end of the file.
     """
-    order = "<" if data.startswith(b"II") else ">"
-    waiting, seen, found = [_number(data, order + "I", 4)], set[int](), []
+    found = []
+    for tags in _directories(data):
+        for offsets, lengths in _PIXELS:
+            both = zip(_values(data, tags.get(offsets)), _values(data, tags.get(lengths)), strict=False)
+            found.append([Part(int(o), int(n)) for o, n in both if o != _UNUSED])
+    return [picture for picture in found if picture]
+
+
+def default_crop(data: bytes) -> tuple[int, int, int, int] | None:
+    """Return top, left, height and width of the frame that a DNG names, in the pixels it holds; None when it names none.
+
+    ``DefaultCropOrigin`` counts from the corner of ``ActiveArea`` (DNG 1.4). LibRaw moves odd corners by a pixel.
+
+    Raises
+    ------
+    ValueError
+        When the tags lie beyond the end of the file.
+    """
+    for tags in _directories(data):
+        origin, size = (_values(data, tags.get(tag)) for tag in (_CROP_ORIGIN, _CROP_SIZE))
+        if len(origin) == len(size) == 2:
+            top, left, *_ = _values(data, tags.get(_ACTIVE)) or [0, 0]
+            return round(top + origin[1]), round(left + origin[0]), round(size[1]), round(size[0])
+    return None
+
+
+def _directories(data: bytes) -> Iterator[dict[int, int]]:
+    """Yield where the entries of each directory are, by tag; what some makers write where none follows is passed over."""
+    order = _order(data)
+    waiting, seen = [_number(data, order + "I", 4)], set[int]()
     while waiting:
         place = waiting.pop()
-        if place in seen or place == 0:
+        if place in seen or place == 0 or place + 2 > len(data):
             continue
         seen.add(place)
-        tags = {}
-        count = _number(data, order + "H", place)
-        for entry in range(place + 2, place + 2 + 12 * count, 12):
-            tags[_number(data, order + "H", entry)] = entry
-        waiting.append(_number(data, order + "I", place + 2 + 12 * count))
-        if _SUB_IFDS in tags:
-            waiting += _values(data, order, tags[_SUB_IFDS])
-        for offsets, lengths in _PIXELS:
-            if offsets in tags and lengths in tags:
-                both = zip(_values(data, order, tags[offsets]), _values(data, order, tags[lengths]), strict=False)
-                found.append([Part(o, n) for o, n in both if o != _UNUSED])
-    return [picture for picture in found if picture]
+        end = place + 2 + 12 * _number(data, order + "H", place)
+        if end + 4 > len(data):
+            continue
+        tags = {_number(data, order + "H", entry): entry for entry in range(place + 2, end, 12)}
+        waiting += [_number(data, order + "I", end), *(int(v) for v in _values(data, tags.get(_SUB_IFDS)))]
+        yield tags
+
+
+def _order(data: bytes) -> str:
+    return "<" if data.startswith(b"II") else ">"
 
 
 def _number(data: bytes, form: str, place: int) -> int:
@@ -70,14 +98,20 @@ def _number(data: bytes, form: str, place: int) -> int:
     return int(value)
 
 
-def _values(data: bytes, order: str, entry: int) -> Iterator[int]:
-    """Return the whole numbers of a directory's entry; those of another type are none."""
+def _values(data: bytes, entry: int | None) -> list[float]:
+    """Return the numbers of a directory's entry; none without an entry, or when they are not numbers."""
+    if entry is None:
+        return []
+    order = _order(data)
     form = _FORMATS.get(_number(data, order + "H", entry + 2))
     count = _number(data, order + "I", entry + 4)
     if form is None or count > _MOST:
-        return iter(())
-    size = struct.calcsize(form) * count
+        return []
+    size = struct.calcsize("=" + form) * count
     place = entry + 8 if size <= 4 else _number(data, order + "I", entry + 8)
     if place + size > len(data):
         raise ValueError("truncated")
-    return iter(struct.unpack_from(f"{order}{count}{form}", data, place))
+    numbers = struct.unpack_from(order + form * count, data, place)
+    if form == _RATIONAL:
+        return [a / b if b else 0.0 for a, b in zip(numbers[::2], numbers[1::2], strict=True)]
+    return list(numbers)

@@ -34,20 +34,20 @@ def whole_raw(data: bytes) -> RawPhotograph:
     raw = decode_raw(data)
     again = decode_raw(data)
     if raw.values.shape != again.values.shape or not np.array_equal(raw.values, again.values):
-        raise ValueError("damaged (it decodes to other pixels each time)")
+        raise ValueError("damaged, for it decodes to other pixels each time")
     distance = 1 if raw.pattern is None else len(raw.pattern)
     # Sensors whose makers take the black off are 0 over and over where it is dark, but not along a whole row.
     run = raw.values.shape[1] - distance if raw.black.min() == 0 else min(_RUN, raw.values.shape[1] - distance)
     limit = _WILD * (raw.white - float(raw.black.mean()))
     for channel in np.atleast_3d(raw.values).transpose(2, 0, 1):
         if channel.min() == channel.max():
-            raise ValueError("without a picture (its pixels are all alike)")
+            raise ValueError("without a picture, for its pixels are all alike")
         # Some sensors saturate below the level that LibRaw knows.
         brightest = np.array([[channel[i::distance, j::distance].max() for j in range(distance)] for i in range(distance)])
         if (row := _first_frozen(channel, np.minimum(brightest, raw.white), run)) >= 0:
-            raise ValueError(f"damaged or copied in part (its pixels repeat themselves in row {row})")
+            raise ValueError(f"damaged or copied in part, for its pixels repeat themselves in row {row}")
         if (row := _first_wild(channel, distance, limit, *_BLOCK)) >= 0:
-            raise ValueError(f"damaged or copied in part (its pixels are random from row {row} on)")
+            raise ValueError(f"damaged or copied in part, for its pixels are random from row {row} on")
     return raw
 
 
@@ -73,7 +73,7 @@ def _require_length(data: bytes) -> None:
         return
     missing = max(ends, default=0) - len(data)
     if missing > 0:
-        raise ValueError(f"truncated ({missing} bytes are missing)")
+        raise ValueError(f"truncated, {missing} bytes are missing")
 
 
 @njit(cache=True)
@@ -98,9 +98,10 @@ def _first_frozen(values: NDArray[Any], saturated: NDArray[Any], run: int) -> in
 
 @njit(cache=True)
 def _first_wild(values: NDArray[Any], distance: int, limit: float, block_rows: int, block_columns: int) -> int:
-    """Return the first row of a block whose pixels differ from those ``distance`` to their right or below by more than ``limit``.
+    """Return the first row of a block whose pixels differ from those to their right and below by more than ``limit``.
 
-    On average over the block; -1 when there is none. Blocks that the border cuts to less than half are passed over.
+    On average over the block, both ways (an edge is but one), ``distance`` pixels away; -1 when there is none. Blocks that the
+    border cuts to less than half are passed over.
     """
     rows, columns = values.shape[0] - distance, values.shape[1] - distance
     for top in range(0, rows, block_rows):
@@ -115,6 +116,6 @@ def _first_wild(values: NDArray[Any], distance: int, limit: float, block_rows: i
                     here = np.int64(values[r, c])  # unsigned differences would wrap
                     across += abs(here - np.int64(values[r, c + distance]))
                     down += abs(here - np.int64(values[r + distance, c]))
-            if max(across, down) > limit * (bottom - top) * (right - left):
+            if min(across, down) > limit * (bottom - top) * (right - left):
                 return top
     return -1
