@@ -8,7 +8,7 @@ rest are compared only where that geometry allows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
@@ -23,13 +23,14 @@ from .guided import guided_matches
 
 Array = NDArray[np.float64]
 
-VERSION = 1  # part of the key under which matches are kept
+VERSION = 2  # part of the key under which matches are kept
 LIMIT = 4.0 / 2000.0  # a verified match is this near its epipolar line (or homography), as a share of the longer side
 LEAST = 15  # verified matches below which a pair is not one
 _COARSE = 3000
 _COARSE_RATIO = 0.85
 _RATIO = 0.85
 _PRODUCT = 0.80
+_EQUAL = 512.0**2  # product of equal descriptors
 _NONE = np.zeros((0, 2), np.int32)
 
 
@@ -38,7 +39,7 @@ class PairMatches:
     """Verified matches (m, 2) of a pair, as indices of features, and COLMAP's two-view geometry.
 
     ``config`` is COLMAP's; the matrices (3, 3; second from first) are zero when absent. ``homography`` is the least-squares one
-    of all matches, whether or not the ground is flat.
+    of all matches, whether or not the ground is flat. ``likeness`` (m,) is the product of the descriptors, 1 for equal ones.
     """
 
     matches: NDArray[np.int32]
@@ -46,6 +47,7 @@ class PairMatches:
     essential: Array
     fundamental: Array
     homography: Array
+    likeness: NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
 
     @classmethod
     def none(cls) -> PairMatches:
@@ -154,7 +156,8 @@ def verify(first: Features, second: Features, cameras: tuple[Camera, Camera], ma
     # A homography that sends the photograph's corner to infinity cannot predict anything.
     usable = plane is not None and abs(plane[2, 2]) > 1e-9
     homography = plane / plane[2, 2] if usable else np.zeros((3, 3))
-    return PairMatches(kept, int(found.config), essential, fundamental, homography)
+    likeness = np.einsum("nk,nk->n", *(f.descriptors[k].astype(np.float32) for f, k in zip((first, second), kept.T, strict=True)))
+    return PairMatches(kept, int(found.config), essential, fundamental, homography, likeness / np.float32(_EQUAL))
 
 
 def write_matches(path: Path, pair: PairMatches) -> None:
@@ -162,14 +165,16 @@ def write_matches(path: Path, pair: PairMatches) -> None:
     with whole(path) as part, part.open("wb") as stream:
         np.savez(
             stream, matches=pair.matches, config=pair.config, essential=pair.essential, fundamental=pair.fundamental,
-            homography=pair.homography,
+            homography=pair.homography, likeness=pair.likeness,
         )  # fmt: skip
 
 
 def read_matches(path: Path) -> PairMatches:
     """Read what ``write_matches`` wrote."""
     with np.load(path, allow_pickle=False) as data:
-        return PairMatches(data["matches"], int(data["config"]), data["essential"], data["fundamental"], data["homography"])
+        return PairMatches(
+            data["matches"], int(data["config"]), data["essential"], data["fundamental"], data["homography"], data["likeness"]
+        )
 
 
 def _passing(products: NDArray[np.float32], ratio: float) -> NDArray[np.int64]:
@@ -178,5 +183,5 @@ def _passing(products: NDArray[np.float32], ratio: float) -> NDArray[np.int64]:
     rows = np.arange(len(products))
     top = products[rows, best]
     second = np.partition(products, -2, axis=1)[:, -2]
-    unit = np.float32(512.0**2)
+    unit = np.float32(_EQUAL)
     return np.where(np.maximum(unit - top, 0) <= ratio**2 * (unit - second), best, -1)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,15 +16,17 @@ from ..files import digest, file_digest, remove
 from ..parallel import run_calls
 from ..photographs.enhance import enhanced_path
 from ..photographs.listing import some
-from ..photographs.reading import decode_pixels, mean_level, read_channel_sum
 from ..progress import SILENT, Progress
 from ..survey import Photograph, Survey, held
 from . import features, matching
 from .database import NAME, provisional_camera, write_database
 from .features import read_features
+from .images import read_grey
 from .matching import PairMatches
 from .pairs import Pair, blocks, choose_pairs, pairs_through_others
+from .refinement import Source, read_refined, refine_keypoints
 from .tiereport import write_report
+from .tracks import build_tracks, within_tracks
 
 CACHE = "cache"  # features and matches, so that what is done need not be done again; it may be deleted
 _FEW = 12
@@ -87,13 +89,18 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         if min(counts) == 0:
             empty = [p.name for p, n in zip(photographs, counts, strict=True) if n == 0]
             progress.warn(f"No features were found in {some(empty)}.")
-        pairs, rule, keys = _pairs(request, photographs, found, cache / "matches", progress.part(0.4, 0.95))
+        pairs, rule, keys = _pairs(request, photographs, found, cache / "matches", progress.part(0.4, 0.7))
+        sources = [
+            Source(str(i.absolute()), None if enhanced else encode(p), request.max_size, f, (p.width, p.height))
+            for i, p, f in zip(images, photographs, found, strict=True)
+        ]
+        pairs, refined = _refine(request, sources, pairs, cache / "refined", progress.part(0.7, 0.95))
         if not pairs:
             raise NotEnoughData(
                 f"No two photographs of {survey.folder} share {matching.LEAST} points: check that they overlap"
                 + ("." if enhanced else ", and run strandline:enhance first.")
             )
-        keypoints = (read_features(path).keypoints() for path in found)
+        keypoints = (read_refined(s, path)[0] for s, path in zip(sources, refined, strict=True))
         write_database(survey.folder / NAME, photographs, keypoints, pairs, before=lambda: survey.forget("tiepoints"))
         match_count = sum(len(p.matches) for p in pairs.values())
         groups = blocks(len(photographs), pairs)
@@ -113,7 +120,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         result = Result(request.survey, float(np.mean(counts)), len(pairs), match_count)
         survey.finish(
             "tiepoints",
-            digest([path.stem for path in found], keys, [p.name for p in photographs]),
+            digest([path.stem for path in refined], keys, [p.name for p in photographs]),
             built_on=("createsurvey", "enhance") if enhanced else ("createsurvey",),
             parameters={
                 "source": "enhanced" if enhanced else "original",
@@ -123,7 +130,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             },
             result={"mean_features": result.mean_features, "pair_count": len(pairs), "match_count": match_count},
         )
-        _remove_strays(cache, {*found, *(cache / "matches" / f"{key}.npz" for key in keys)})
+        _remove_strays(cache, {*found, *refined, *(cache / "matches" / f"{key}.npz" for key in keys)})
     progress.at(1.0)
     return result
 
@@ -175,14 +182,7 @@ def _features(
 
 def _find_features(image: str, photograph: dict[str, Any] | None, path: str, max_features: int, max_size: int) -> None:
     """Write the features of an enhanced image, or of the photograph that ``photograph`` describes."""
-    source = Path(image)
-    if photograph is None:
-        try:
-            grey = decode_pixels(source.read_bytes())
-        except ValueError as error:
-            raise InputError(f"The enhanced image {image} is {error}: delete it and run strandline:enhance again.") from error
-    else:
-        grey = mean_level(read_channel_sum(source, decode(Photograph, photograph)))
+    grey = read_grey(image, photograph)
     features.write_features(Path(path), features.detect(grey, max_features=max_features, max_size=max_size))
 
 
@@ -229,6 +229,28 @@ def _match_files(
     else:
         found = matching.match_predicted(a, b, cameras, np.array(homography))
     matching.write_matches(Path(path), found)
+
+
+def _refine(
+    request: Request, sources: Sequence[Source], pairs: dict[Pair, PairMatches], folder: Path, progress: Progress
+) -> tuple[dict[Pair, PairMatches], list[Path]]:
+    """Return the matches between well tied keypoints, and for each photograph the file of its refined keypoints."""
+    counts = [len(read_features(s.features)) for s in sources]
+    matches = {pair: m.matches for pair, m in pairs.items()}
+    tracks = build_tracks(matches, {pair: m.likeness for pair, m in pairs.items()}, counts)
+
+    def run_all(function: Callable[..., None], calls: Iterable[tuple[Any, ...]], total: int, part: Progress) -> None:
+        for _ in run_calls(function, calls, workers=request.workers, scheduler=request.scheduler, progress=part, total=total):
+            pass
+
+    refined = refine_keypoints(sources, tracks, matches, folder=folder, run=run_all, progress=progress)
+    tied = [np.where(read_refined(s, path)[1], track, -1) for s, path, track in zip(sources, refined, tracks, strict=True)]
+    kept = {}
+    for (i, j), pair in pairs.items():
+        inside = within_tracks(pair.matches, tied[i], tied[j])
+        if inside.sum() >= matching.LEAST:
+            kept[i, j] = replace(pair, matches=pair.matches[inside], likeness=pair.likeness[inside])
+    return kept, refined
 
 
 def _apart(photographs: Sequence[Photograph], groups: list[list[int]]) -> str:

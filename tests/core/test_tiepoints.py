@@ -99,7 +99,7 @@ def test_sand_is_oriented(sand):
     assert turned.mtp > turned.mmtp > 500
     assert turned.mtp_percent > 90
     assert turned.mmtp_percent > 90
-    assert 0.1 < turned.mse < 0.6
+    assert 0.01 < turned.mse < 0.1  # least-squares matching holds some hundredths of a pixel
     block = read_block(survey / "model")
     assert [v.name for v in block.views] == [f"IMG_00{n}.jpg" for n in (58, 61, 64, 67)]
     assert {v.camera.model for v in block.views} == {"OPENCV"}
