@@ -222,7 +222,7 @@ def _draw_graph(
     strength = np.array([n for n, _, _ in drawn], float)
     lines = LineCollection(
         [(place[i], place[j]) for _, i, j in drawn],
-        linewidths=0.2 + 3.0 * strength / strength.max(),
+        linewidths=0.1 + min(3.0, 60.0 / np.sqrt(len(drawn))) * strength / strength.max(),
         array=np.log10(strength),
         cmap="YlGnBu",
         clim=(1.0, max(2.0, float(np.log10(strength.max())))),
@@ -242,7 +242,7 @@ def _draw_graph(
     report.figure(
         figure,
         "Pairs between the photographs' GNSS positions, the wider and darker the more verified matches; red: weakly tied."
-        + (f" {left} photographs without a position are not drawn." if left else ""),
+        + (f" Not drawn, for want of a position: {left}." if left else ""),
         dense=len(drawn) > 200,
     )
 

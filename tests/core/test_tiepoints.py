@@ -115,7 +115,7 @@ def test_sand_is_oriented(sand):
     assert len(cloud.points) == len(block.points)
     assert np.abs(np.asarray(cloud.xyz) - block.points).max() < 1e-5
     page = (folder / "turn.html").read_text(encoding="utf-8")
-    assert page.count("<img") == 8  # coverage in two rows, matrix, histograms, three photographs and a detail
+    assert page.count("<img") == 9  # residuals and their field, rays, three clouds, the barest photograph, coverage in two rows
     assert "OPENCV" in page
 
 
