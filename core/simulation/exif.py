@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,28 +33,39 @@ class Metadata:
     focal: float
 
 
+class Tags(NamedTuple):
+    """EXIF by its three directories: a number, fraction, text or bytes by tag."""
+
+    base: dict[int, Any]
+    photo: dict[int, Any]
+    gps: dict[int, Any]
+
+
 def save_jpeg(path: Path, pixels: NDArray[np.uint8], metadata: Metadata) -> None:
     """Write ``pixels`` (rows, columns, 3) with its metadata."""
     rows, columns = pixels.shape[:2]
+    shared, exif = tags(metadata, columns, rows), Image.Exif()
+    exif.update(shared.base)
+    exif.get_ifd(ExifTags.IFD.Exif).update(shared.photo)
+    exif.get_ifd(ExifTags.IFD.GPSInfo).update(shared.gps)
     Image.fromarray(pixels).save(
         path,
         "JPEG",
         quality=_JPEG_QUALITY,
-        exif=_exif(metadata, columns, rows).tobytes(),
-        xmp=_xmp(metadata).encode(),
+        exif=exif.tobytes(),
+        xmp=xmp(metadata).encode(),
     )
 
 
-def _exif(m: Metadata, columns: int, rows: int) -> Image.Exif:
+def tags(m: Metadata, columns: int, rows: int) -> Tags:
+    """Return the EXIF of a photograph of ``columns`` x ``rows`` pixels."""
     taken = datetime.datetime.fromisoformat(m.time)
     stamp = taken.strftime("%Y:%m:%d %H:%M:%S")
-    base, photo, gps = ExifTags.Base, ExifTags.IFD.Exif, ExifTags.IFD.GPSInfo
-    exif = Image.Exif()
-    exif[base.Make], exif[base.Model], exif[base.Orientation] = MAKER, MODEL, 1
-    exif[base.DateTime] = stamp
+    base, tag = ExifTags.Base, ExifTags.GPS
     millimetres = m.focal * _PIXEL
     equivalent = m.focal / float(np.hypot(columns, rows)) * _FULL_FRAME
-    exif.get_ifd(photo).update(
+    return Tags(
+        {base.Make: MAKER, base.Model: MODEL, base.Orientation: 1, base.DateTime: stamp},
         {
             base.ExposureTime: IFDRational(1, 1000),
             base.FNumber: IFDRational(28, 10),
@@ -69,10 +81,7 @@ def _exif(m: Metadata, columns: int, rows: int) -> Image.Exif:
             base.FocalPlaneXResolution: IFDRational(round(10 / _PIXEL), 1),
             base.FocalPlaneYResolution: IFDRational(round(10 / _PIXEL), 1),
             base.FocalPlaneResolutionUnit: 3,
-        }
-    )
-    tag = ExifTags.GPS
-    exif.get_ifd(gps).update(
+        },
         {
             tag.GPSVersionID: b"\x02\x03\x00\x00",
             tag.GPSLatitudeRef: "N" if m.latitude >= 0 else "S",
@@ -82,9 +91,8 @@ def _exif(m: Metadata, columns: int, rows: int) -> Image.Exif:
             tag.GPSAltitudeRef: b"\x00" if m.height >= 0 else b"\x01",
             tag.GPSAltitude: IFDRational(round(abs(m.height) * 1000), 1000),
             tag.GPSMapDatum: "WGS-84",
-        }
+        },
     )
-    return exif
 
 
 def _sexagesimal(degrees: float) -> tuple[IFDRational, IFDRational, IFDRational]:
@@ -93,7 +101,8 @@ def _sexagesimal(degrees: float) -> tuple[IFDRational, IFDRational, IFDRational]
     return IFDRational(minutes // 60, 1), IFDRational(minutes % 60, 1), IFDRational(seconds, 10**6)
 
 
-def _xmp(m: Metadata) -> str:
+def xmp(m: Metadata) -> str:
+    """Return the XMP packet, with the names of DJI's drones."""
     values = {
         "GpsStatus": "RTK",
         "AltitudeType": "RtkAlt",

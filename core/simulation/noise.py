@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 # Gradient noise with components uniform in [-1, 1] and the quintic fade has variance 8/3 Iab = 0.031021, where
 # Ia and Ib integrate f^2 t^2 and f^2 over 0..1, f = 1 - (6 t^5 - 15 t^4 + 10 t^3). This brings it to 1.
@@ -45,3 +47,24 @@ def octaves(x: float, y: float, finest: float, count: int, seed: int) -> float:
         total += noise(x / grain, y / grain, seed + 7919 * k)
         grain *= 2.0
     return total / math.sqrt(count)
+
+
+def averaged(width: float) -> float:
+    """Return the standard deviation that ``noise`` keeps when it is averaged over squares of ``width`` grains.
+
+    A node's share of the noise is ``g_x k1(x) k0(y) + g_y k0(x) k1(y)`` with k0 the fade, k1(x) = x k0(x) and gradients of
+    variance 1/3; averaging does to k0 and k1 what it does to the noise. ``averaged(0)`` is 1.
+    """
+    x = np.linspace(-1.0 - width, 1.0 + width, 4001)
+    t = np.minimum(np.abs(x), 1.0)
+    fade = 1.0 - t**3 * (t * (t * 6.0 - 15.0) + 10.0)
+    power = [float(np.trapezoid(_box(x, kernel, width) ** 2, x)) for kernel in (fade, x * fade)]
+    return _UNIT * math.sqrt(2.0 / 3.0 * power[0] * power[1])
+
+
+def _box(x: NDArray[np.float64], values: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+    """Return the mean of ``values`` (n,) at ``x`` (n,) over ``width`` about each place; they are 0 beyond."""
+    if width == 0.0:
+        return values
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(x))])
+    return np.asarray((np.interp(x + 0.5 * width, x, total) - np.interp(x - 0.5 * width, x, total)) / width, float)

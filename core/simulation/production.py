@@ -18,7 +18,7 @@ from ..files import remove
 from ..frames import transformer
 from ..parallel import run_calls
 from ..progress import Progress
-from . import exif, ground, outputs, rendering, sensor, truth
+from . import dng, exif, ground, outputs, rendering, sensor, truth
 from .flight import Plan, fly, footprint_bounds, lens, plan
 from .placement import Placement
 from .report import precision_map, write_report
@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 
 # Two flights in a year: start, exposure, the sun's azimuth (from north) and elevation (degrees).
 _DATES = (("2024-03-12T10:40:00", 1.0, 138.0, 46.0), ("2024-10-09T11:05:00", 0.93, 152.0, 41.0))
+JPG, RAW = "jpg", "raw"  # folders of a date; a photograph has the same name in both
 _INTERVAL = 2.0  # s between photographs
 _FINEST, _COARSEST = 0.01, 0.06  # m, cells of the fields; ripples want them fine
 _MOST_CELLS = 1.2e8
@@ -175,17 +176,19 @@ def _scene(setting: Setting, date: Date, fields: rendering.Fields) -> rendering.
 
 def _exposures(setting: Setting, date: Date, fields: rendering.Fields, folder: Path) -> list[tuple[Any, ...]]:
     """Return the arguments of ``_photograph`` for each of a date's photographs."""
-    (folder / "jpg").mkdir()
-    told = _told(setting, date)
-    return [(setting, date, fields, i, told[i], str(folder / "jpg" / view.name)) for i, view in enumerate(date.views)]
+    for kind in (JPG, RAW):
+        (folder / kind).mkdir()
+    return [(setting, date, fields, i, told, folder) for i, told in enumerate(_told(setting, date))]
 
 
-def _photograph(setting: Setting, date: Date, fields: rendering.Fields, i: int, told: exif.Metadata, path: str) -> None:
-    """Render one photograph and write it."""
+def _photograph(setting: Setting, date: Date, fields: rendering.Fields, i: int, told: exif.Metadata, folder: Path) -> None:
+    """Render one exposure; write the mosaic as RAW and what the camera makes of it as JPG."""
     random = _random(setting.request, date.number, _SENSOR, i)
     light = _scene(setting, date, fields).render(date.views[i], int(random.integers(1 << 30)))
-    signal = sensor.expose(sensor.electrons(light, _DATES[date.number][1]), setting.request.noise, random)
-    exif.save_jpeg(Path(path), sensor.develop(signal), told)
+    mosaic = sensor.expose(light, _DATES[date.number][1], setting.request.noise, random)
+    name = Path(date.views[i].name)
+    dng.save_dng(folder / RAW / name.with_suffix(".dng"), mosaic, told)
+    exif.save_jpeg(folder / JPG / name, sensor.develop(mosaic), told)
 
 
 def _told(setting: Setting, date: Date) -> list[exif.Metadata]:

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from ..block import View
 from .noise import noise
-from .terrain import Beach, grain_count, height_at, reflectance_at
+from .terrain import GRAINS, Beach, grain_weights, height_at, reflectance_at
 
 Array = NDArray[np.float64]
 
 FINE = 2  # cells of reflectance per cell of height, each way
 RADIANCE_UNIT = 1.0 / 20000  # of the stored radiance; that of dry flat sand is 1
-_SKY = 0.6  # share of the light that comes from the whole sky; haze keeps beaches low in contrast
+_SKY = 0.8  # share of the light that comes from the whole sky: thin cloud, under which ripples shade less than sand varies
 _LATTICE = 4  # pixels between exact rays; linear in between they err by less than 0.001 px
 _BLACK, _WHITE = 0.25, 1.9  # paint, relative to dry sand
 _ONE_HIT = 0.95  # of |m| times the steepest slope; below it a ray meets the surface once
@@ -85,8 +85,7 @@ def fill(fields: Fields, start: int, end: int) -> None:
     heights[start:end] = band[1:-2]
     sun = fields.light.direction
     out = np.empty(((end - start) * FINE, f.columns * FINE), np.uint16)
-    finest = 1.5 * f.cell
-    texture = (across, seed, fields.after, beach.contrast, finest, grain_count(finest))
+    texture = (across, seed, fields.after, beach.contrast, GRAINS, grain_weights(f.cell / FINE))
     _radiance(band, out, f.a, c, f.cell, sun, *texture)
     radiance[start * FINE : end * FINE] = out
     heights.flush()
@@ -155,7 +154,7 @@ def _heights(
 @njit(cache=True, nogil=True)
 def _radiance(
     heights: Any, out: Any, a: float, c: float, cell: float, sun: Any,
-    across: float, seed: int, after: bool, contrast: float, finest: float, count: int,
+    across: float, seed: int, after: bool, contrast: float, grains: Any, weights: Any,
 ) -> None:  # fmt: skip
     """Fill ``out`` below the second row of ``heights``, whose first is at ``c``."""
     inv = 1.0 / cell
@@ -167,7 +166,7 @@ def _radiance(
             zy = (_height(heights, a, c, inv, x, y + cell) - _height(heights, a, c, inv, x, y - cell)) * 0.5 * inv
             facing = (sun[2] - zx * sun[0] - zy * sun[1]) / math.sqrt(1.0 + zx * zx + zy * zy)
             light = _SKY + (1.0 - _SKY) * max(facing, 0.0) / sun[2]
-            value = light * reflectance_at(x, y, across, seed, after, contrast, finest, count)
+            value = light * reflectance_at(x, y, across, seed, after, contrast, grains, weights)
             out[i, j] = int(min(value / RADIANCE_UNIT, 65535.0))
 
 

@@ -14,7 +14,7 @@ from ..survey import held
 from .terrain import Beach
 
 _FILE = "simulation.json"
-_VERSION = 3  # of what the same parameters give
+_VERSION = 4  # of what the same parameters give
 _SIDECARS = (".aux.xml", "-wal", "-shm", "-journal", ".qmd", ".qml")  # what looking at the files may add
 
 

@@ -14,14 +14,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .noise import noise, octaves
+from .noise import averaged, noise, octaves
 
 Array = NDArray[np.float64]
 
 DRAWN_WIDTH = 40.0
 STABLE_UNTIL = 7.5  # of the drawn width: the ground landward of it does not change
 ZONES = {"dune": (8.0, 21.0), "berm": (21.0, 31.0), "foreshore": (31.0, 40.0)}
-_COARSEST = 6.0  # m, the largest grain of the sand's reflectance
+# Grains of the sand's reflectance (m): eight, from 2 cm to 3 m in equal ratios, little more than an octave apart.
+GRAINS = 0.02 * 150.0 ** (np.arange(8) / 7.0)
 
 # What changed: centre along (share of length), half-length (share), centre across, half-widths landward and seaward (drawn
 # metres), height (m at the drawn width).
@@ -31,7 +32,10 @@ _DEPOSITION = (0.66, 0.22, 29.5, 5.0, 5.0, 0.35)
 
 @dataclass(frozen=True)
 class Beach:
-    """A beach ``length`` along and ``width`` across the shore (m), whose sand has the relative contrast ``contrast``."""
+    """A beach ``length`` along and ``width`` across the shore (m), whose sand has the contrast ``contrast``.
+
+    That is the RMS of its reflectance, relative to the mean, over features from 2 cm to 3 m, with equal power in each octave.
+    """
 
     length: float
     width: float
@@ -120,17 +124,19 @@ def height_at(a: float, c: float, length: float, across: float, relief: float, s
 
 @njit(cache=True, nogil=True)
 def reflectance_at(
-    a: float, c: float, across: float, seed: int, after: bool, contrast: float, finest: float, count: int
+    a: float, c: float, across: float, seed: int, after: bool, contrast: float, grains: Array, weights: Array
 ) -> float:
-    """Return the reflectance relative to that of dry sand, with grains from ``finest`` (m) up in ``count`` octaves."""
+    """Return the reflectance relative to that of dry sand, whose ``grains`` (m) have ``weights`` (see ``grain_weights``)."""
     x = c / across
     now = seed + 700
     if after and x > 8.5 + 0.5 * noise(a / 0.9, c / 0.9, seed + 100):
         now = seed + 800  # sand moves between the dates
-    texture = octaves(a, c, finest, count, now)
+    texture = 0.0
+    for k in range(grains.size):
+        texture += weights[k] * noise(a / grains[k], c / grains[k], now + 7919 * k)
     waterline = 33.5 + 0.8 * noise(a / 6.0, 0.5, now + 101)
     wet = _step(x, waterline - 1.2, waterline + 0.8)
-    band = -2.5 * wet + 0.8 * noise(a / 22.0, c / 3.0, now + 102) * (1.0 - wet)
+    band = -2.5 * wet + 0.8 * noise(a / 22.0, c / 7.0, now + 102) * (1.0 - wet)
     wrack = abs(x - 28.6 - 0.6 * noise(a / 4.0, 0.5, now + 103))
     if wrack < 0.5 and noise(a / 0.22, c / 0.22, now + 104) > 0.9 + 2.0 * wrack:
         band -= 5.0
@@ -139,9 +145,9 @@ def reflectance_at(
     return max(1.0 + contrast * (texture + band), 0.02)
 
 
-def grain_count(finest: float) -> int:
-    """Return how many octaves of reflectance lie between ``finest`` and the coarsest grain of sand."""
-    return max(1, int(math.log2(_COARSEST / finest)) + 1)
+def grain_weights(width: float) -> Array:
+    """Return the standard deviation (8,) that each of ``GRAINS`` has in squares of ``width`` (m), for a contrast of 1."""
+    return np.array([averaged(width / grain) for grain in GRAINS]) / math.sqrt(len(GRAINS))
 
 
 @njit(cache=True, nogil=True)

@@ -5,10 +5,12 @@ import dataclasses
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import rasterio
+import rawpy
 from numpy.testing import assert_allclose
 from PIL import ExifTags, Image
 from strandline.core.block import View
@@ -16,6 +18,9 @@ from strandline.core.camera import Camera
 from strandline.core.contract import VectorSource
 from strandline.core.errors import InputError
 from strandline.core.frames import LocalFrame
+from strandline.core.photographs.listing import list_photographs
+from strandline.core.photographs.metadata import read_metadata
+from strandline.core.simulation import sensor
 from strandline.core.simulation.simulatesurvey import Request, Result, run
 from strandline.core.vector import read_layer
 
@@ -53,6 +58,10 @@ def test_folder_holds_what_a_survey_needs(made: tuple[Path, Result]) -> None:
     for day in DAYS:
         photographs = [n for n in names if n.startswith(f"{day}/jpg/")]
         assert len(photographs) == result.image_count
+        # Each beside its RAW of the same name.
+        assert {n.replace("/jpg/", "/raw/").replace(".jpg", ".dng") for n in photographs} == {
+            n for n in names if n.startswith(f"{day}/raw/")
+        }
         assert {f"{day}/gcps.gpkg", f"{day}/marks.csv", f"{day}/gcp_list.txt"} < names
     truth = ("before_dsm.tif", "after_dsm.tif", "difference.tif", "volumes.json", "volumes.csv", "cameras.json")
     assert {f"truth/{name}" for name in truth} < names
@@ -135,6 +144,28 @@ def test_white_and_black_of_the_targets_are_in_the_photographs(made: tuple[Path,
             assert np.percentile(patch, 80) - np.percentile(patch, 20) > 80
 
 
+def test_jpg_is_made_of_the_raw(made: tuple[Path, Result], tmp_path: Path) -> None:
+    folder, _ = made
+    for path in sorted((folder / DAYS[1] / "raw").iterdir())[:2]:
+        jpg = folder / DAYS[1] / "jpg" / f"{path.stem}.jpg"
+        with rawpy.imread(str(path)) as raw:
+            mosaic = raw.raw_image.copy()
+        Image.fromarray(sensor.develop(mosaic)).save(tmp_path / "again.jpg", quality=90)
+        with Image.open(tmp_path / "again.jpg") as again, Image.open(jpg) as kept:
+            assert np.array_equal(np.asarray(again), np.asarray(kept))
+        assert read_metadata(path.read_bytes()) == read_metadata(jpg.read_bytes())
+
+
+def test_one_kind_makes_a_survey_and_both_are_refused(made: tuple[Path, Result], tmp_path: Path) -> None:
+    day = made[0] / DAYS[0]
+    jpg, raw = (list_photographs(day / kind, None, tmp_path) for kind in ("jpg", "raw"))
+    assert [n.replace(".jpg", ".dng") for n in jpg] == raw
+    with pytest.raises(InputError, match=rf"more than one file of {len(jpg)} exposures .* FILTER"):
+        list_photographs(day, None, tmp_path)
+    assert list_photographs(day, "*.dng", tmp_path) == [f"raw/{n}" for n in raw]
+    assert list_photographs(day, "jpg/*", tmp_path) == [f"jpg/{n}" for n in jpg]
+
+
 def test_truth_volumes_are_the_integral_of_the_difference(made: tuple[Path, Result]) -> None:
     folder, result = made
     with rasterio.open(folder / "truth" / "difference.tif") as file:
@@ -206,6 +237,19 @@ def test_failure_leaves_nothing_and_earlier_results(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(production.outputs, "write_polygons", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         run(tiny)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_full_disk_is_one_sentence_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from strandline.core.simulation import dng
+
+    def save_on_full_disk(path: Path, *rest: Any) -> None:
+        save(Path("/dev/full") if path.stem.endswith("_0003") else path, *rest)
+
+    save = dng.save_dng
+    monkeypatch.setattr(dng, "save_dng", save_on_full_disk)
+    with pytest.raises(InputError, match="the disk is full"):
+        run(dataclasses.replace(TINY, output=str(tmp_path / "s")))
     assert list(tmp_path.iterdir()) == []
 
 

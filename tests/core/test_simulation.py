@@ -12,9 +12,9 @@ from strandline.core.block import View
 from strandline.core.camera import Camera
 from strandline.core.errors import InputError
 from strandline.core.simulation import flight, ground, rendering, sensor
-from strandline.core.simulation.noise import noise, octaves
+from strandline.core.simulation.noise import averaged, noise, octaves
 from strandline.core.simulation.placement import Placement
-from strandline.core.simulation.terrain import Beach, reflectance_at
+from strandline.core.simulation.terrain import GRAINS, Beach, grain_weights, reflectance_at
 from strandline.core.simulation.truth import stable_polygon, surface_rows, truth_grid, zone_polygons
 
 BEACH = Beach(length=60.0, width=40.0, contrast=0.04, seed=1)
@@ -60,17 +60,77 @@ def test_heights_change_by_those_volumes(width: float, length: float) -> None:
 def test_ground_behind_the_dune_is_the_same_to_the_bit() -> None:
     a, c = np.meshgrid(np.linspace(-5, 65, 300), np.linspace(-20, 7.5, 200))
     assert np.array_equal(BEACH.heights(a, c, False), BEACH.heights(a, c, True))
-    same = [reflectance_at(30.0, 5.5, 1.0, 9, after, 0.04, 0.06, 7) for after in (False, True)]
+    weights = grain_weights(0.01)
+    same = [reflectance_at(30.0, 5.5, 1.0, 9, after, 0.04, GRAINS, weights) for after in (False, True)]
     assert same[0] == same[1]
-    other = [reflectance_at(30.0, 25.5, 1.0, 9, after, 0.04, 0.06, 7) for after in (False, True)]
+    other = [reflectance_at(30.0, 25.5, 1.0, 9, after, 0.04, GRAINS, weights) for after in (False, True)]
     assert other[0] != other[1]
 
 
-def test_sand_has_the_contrast_asked_for() -> None:
+def test_octaves_have_unit_variance() -> None:
     random = np.random.default_rng(1)
     a, c = random.uniform(0, 3000, 20000), random.uniform(0, 3000, 20000)
-    texture = np.array([octaves(u, v, 0.06, 7, 3) for u, v in zip(a, c, strict=True)])
-    assert_allclose(texture.std(), 1.0, atol=0.03)  # contrast multiplies it
+    values = np.array([octaves(u, v, 0.06, 7, 3) for u, v in zip(a, c, strict=True)])
+    assert_allclose(values.std(), 1.0, atol=0.03)
+
+
+def test_noise_averaged_over_squares() -> None:
+    assert_allclose(averaged(0.0), 1.0, rtol=1e-5)
+    inside = (np.arange(12) + 0.5) / 12 - 0.5
+    places = np.random.default_rng(0).uniform(0, 3000, (3000, 2))
+    for width in (0.5, 1.0, 2.0):
+        means = [np.mean([noise(x + u * width, y + v * width, 3) for u in inside for v in inside]) for x, y in places]
+        # 3,000 squares: 1.3 % sigma of a sigma.
+        assert_allclose(np.std(means), averaged(width), rtol=0.04)
+
+
+def test_grains_lie_from_2_cm_to_3_m() -> None:
+    assert_allclose(GRAINS[[0, -1]], [0.02, 3.0])
+    assert_allclose(np.diff(np.log2(GRAINS)), math.log2(150) / 7)
+    assert_allclose((grain_weights(0.0) ** 2).sum(), 1.0, rtol=1e-5)
+    # What is finer than the squares goes: of 2 cm little is left in 6 cm, of 3 m everything.
+    weights = grain_weights(0.06) * math.sqrt(8)
+    assert weights[0] < 0.15
+    assert weights[-1] > 0.999
+
+
+@pytest.mark.parametrize("gsd", [0.01, 0.04])
+def test_albedo_in_the_photographs_has_the_contrast_asked_for(gsd: float) -> None:
+    contrast = 0.012
+    albedo = flat_sand(contrast, gsd)
+    power, size = spectrum(albedo / albedo.mean() - 1.0, gsd)
+    octaves_of_size = 0.02 * 2.0 ** np.arange(6)  # from 2 cm: up to 1.28 m, of which the picture shows enough
+    rms = np.array([math.sqrt(power[(size >= s) & (size < 2 * s)].sum()) for s in octaves_of_size]) / contrast
+    # Seven octaves and a quarter with equal power, 0.37 each, of which a little lies beyond the ends. The pixels average
+    # what is finer than twice their size, and the coarsest octave varies by a tenth from place to place.
+    assert_allclose(rms[octaves_of_size >= 2 * gsd], 0.345, rtol=0.12)
+    assert rms[0] < (0.33 if gsd == 0.01 else 0.1)
+    if gsd == 0.01:
+        # The whole of it. Three metres fit four times into the picture: their octave alone adds or takes 5 %.
+        assert_allclose(math.sqrt(power[(size >= 0.02) & (size <= 3.0)].sum()), contrast, rtol=0.1)
+
+
+def flat_sand(contrast: float, gsd: float) -> np.ndarray:
+    """Return the light of level sand under an even light, without path, wrack and wet sand, from straight above."""
+    camera = Camera("PINHOLE", 1200, 1200, (1300.0, 1300.0, 600.0, 600.0))
+    cells, far = 1210, 1200.0  # of a beach 4 km wide that is its berm: sand and nothing else
+    field = rendering.Field(0.0, far, gsd, cells, cells)
+    radiance = np.empty((2 * cells, 2 * cells), np.uint16)
+    sand = (100.0, 3, False, contrast, GRAINS, grain_weights(gsd / rendering.FINE))
+    plumb = np.array([0.0, 0.0, 1.0])
+    rendering._radiance(np.zeros((cells + 3, cells)), radiance, 0.0, far - gsd, gsd, plumb, *sand)
+    scene = rendering.Scene.of(field, np.zeros((cells, cells), np.float32) + 1, radiance, np.empty((0, 4)), 0.0)
+    centre = np.array([605 * gsd, far + 605 * gsd, 1.0 + 1300.0 * gsd])
+    return scene.render(View("v", camera, NADIR, -NADIR @ centre), 1)[0]
+
+
+def spectrum(values: np.ndarray, gsd: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return what each frequency adds to the variance, and its feature size: half a wavelength (m)."""
+    window = np.hanning(values.shape[0])[:, None] * np.hanning(values.shape[1])
+    power = np.abs(np.fft.fft2(values * window)) ** 2 / (window**2).sum() / values.size
+    frequency = np.hypot(np.fft.fftfreq(values.shape[0], gsd)[:, None], np.fft.fftfreq(values.shape[1], gsd))
+    frequency[0, 0] = 1e-9
+    return power, 0.5 / frequency
 
 
 def test_placement_there_and_back() -> None:
@@ -262,26 +322,81 @@ def bilinear(heights: np.ndarray, at: np.ndarray) -> np.ndarray:
     return (1 - v) * upper + v * ((1 - u) * z[i + 1, j] + u * z[i + 1, j + 1])
 
 
+def even_light(level: float, rows: int = 300, columns: int = 302) -> np.ndarray:
+    """Return the light of paint, which is white: the same of all colours."""
+    light = np.zeros((3, rows, columns), np.float32)
+    light[1] = level
+    return light
+
+
+def test_mosaic_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sensor, "NEUTRAL", (0.5, 1.0, 0.8))
+    assert_allclose(sensor.ELECTRONS, 9000 / 3839)
+    light = np.zeros((3, 2, 2), np.float32)
+    light[0] = 1.0  # dry sand: in green half of a full well, in red 1.1 x 0.5 of that, in blue 0.8 x 0.8
+    mosaic = sensor.expose(light, 1.0, 0.0, np.random.default_rng(0))
+    # The middle of these pixels lies halfway to the corners, where vignetting takes a quarter of its 12 %.
+    lit = 0.97 * 0.5 * 3839
+    assert mosaic.tolist() == [
+        [round(256 + 0.55 * lit), round(256 + lit)],
+        [round(256 + lit), round(256 + 0.64 * lit)],
+    ]
+    assert sensor.expose(0 * light, 1.0, 0.0, np.random.default_rng(0)).tolist() == [[256, 256], [256, 256]]
+    assert sensor.expose(9 * light, 1.0, 0.0, np.random.default_rng(0)).max() == 4095
+
+
 def test_sensor_has_the_noise_asked_for() -> None:
-    mean = np.full((3, 300, 300), 4000.0, np.float32)
-    for noise_factor in (0.0, 1.0, 2.0):
-        signal = sensor.expose(mean, noise_factor, np.random.default_rng(1))
-        # sqrt(4000 + 5^2) electrons; 270,000 samples: 0.14 % sigma of a sigma.
-        assert_allclose(signal.std(), noise_factor * math.sqrt(4025.0), rtol=0.01, atol=1e-3)
-        pixels = sensor.develop(signal).astype(float)
-        expected = sensor.noise_level(4000.0, noise_factor)
-        if noise_factor:
-            # Rounding to whole grey levels adds a variance of 1/12.
-            assert_allclose(pixels.std(), math.sqrt(expected**2 + 1 / 12), rtol=0.02)
-    assert_allclose(sensor.noise_level(4000.0, 1.0), 1.2200, rtol=1e-4)  # 255 x 1.099 x 0.45 x (1/3)^-0.55 x 63.4 / 12000
+    light = even_light(0.8)
+    still = sensor.expose(light, 1.0, 0.0, np.random.default_rng(1)).astype(float)
+    for factor in (1.0, 2.0):
+        error = sensor.expose(light, 1.0, factor, np.random.default_rng(1)) - still
+        green = (error[::2, 1::2], still[::2, 1::2])
+        electrons = (green[1].mean() - sensor.BLACK) * sensor.ELECTRONS
+        # 22,650 pixels: 0.5 % sigma of a sigma; rounding twice adds another 1/12 of variance, and vignetting spreads the mean.
+        assert_allclose(green[0].std(), sensor.noise_level(electrons, factor), rtol=0.02)
+        assert abs(error.mean()) < 0.3
+    # sqrt(4500 + 4^2) electrons at 2.344 a DN, and the rounding.
+    assert_allclose(sensor.noise_level(4500.0, 1.0), math.sqrt((67.2012 / 2.344361) ** 2 + 1 / 12), rtol=1e-5)
+    dark = sensor.expose(even_light(0.0), 1.0, 1.0, np.random.default_rng(2))
+    assert_allclose(dark.std(), math.sqrt((4 / 2.344361) ** 2 + 1 / 12), rtol=0.02)
+    assert_allclose(dark.mean(), sensor.BLACK, atol=0.03)  # noise below black is kept
 
 
-def test_development_is_monotonic_and_ends_at_white() -> None:
-    ramp = np.broadcast_to(np.linspace(-50, 13000, 500, dtype=np.float32), (3, 1, 500))
-    values = sensor.develop(np.ascontiguousarray(ramp))[0, :, 0].astype(int)
-    assert values[0] == 0
-    assert values[-1] == 255
-    assert (np.diff(values) >= 0).all()
+def test_sand_does_not_saturate() -> None:
+    red, green, blue = sensor.sand_electrons()
+    assert max(red, green, blue) < 0.6 * sensor.FULL_WELL
+    white = sensor.expose(even_light(1.9), 1.0, 0.0, np.random.default_rng(0))  # the targets' paint
+    assert white.max() < sensor.WHITE
+
+
+def test_camera_makes_white_of_white() -> None:
+    mosaic = sensor.expose(even_light(1.0), 1.0, 0.0, np.random.default_rng(0))
+    photograph = sensor.develop(mosaic)
+    assert photograph.shape == (300, 302, 3)
+    middle = photograph[149:151, 150:152]
+    # 1.099 x 0.5^0.45 - 0.099 of 255: 179.9, the same in all colours.
+    assert np.abs(middle.astype(int) - 180).max() <= 1
+    # Even colour comes out even, at the border too.
+    assert np.ptp(photograph.astype(int), axis=2).max() <= 1
+
+
+def test_colours_stay_in_their_places() -> None:
+    light = np.zeros((3, 40, 60), np.float32)
+    light[1, :, :30], light[2, :, 30:] = 1.0, 1.0  # paint, and the bluer sea
+    photograph = sensor.develop(sensor.expose(light, 1.0, 0.0, np.random.default_rng(0))).astype(int)
+    red, green = photograph[:, :, 0], photograph[:, :, 1]
+    assert np.abs(red - green)[:, :28].max() <= 1
+    assert (green - red)[:, 32:].min() > 10
+    edge = green.mean(axis=0)
+    assert_allclose(np.interp(0.5 * (edge[20] + edge[40]), edge[40:20:-1], np.arange(40, 20, -1) + 0.5), 30, atol=0.3)
+
+
+def test_development_is_monotonic_from_black_to_white() -> None:
+    values = [int(sensor.develop(np.full((6, 6), dn, np.uint16))[2, 2, 1]) for dn in (0, 256, 300, 1000, 2000, 4000, 4095)]
+    assert values == sorted(values)
+    assert (values[0], values[1], values[-1]) == (0, 0, 255)
+    # (1000 - 256) / 3839 = 0.1938: 1.099 x 0.4778 - 0.099 of 255.
+    assert values[3] == 109
 
 
 def test_targets_lie_apart_on_ground_that_can_hold_them() -> None:
