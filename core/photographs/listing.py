@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
 from ..errors import InputError
-from .reading import DECODABLE, RAW
+from .reading import DECODABLE, RAW, is_raw
 
 _SHOWN = 8
 
@@ -77,10 +77,20 @@ def _matches(name: str, pattern: str) -> bool:
 
 
 def _refuse_twins(names: list[str]) -> None:
-    exposures = defaultdict(list)
+    """Refuse files of one name but for the ending, in one folder, or in any when one is a RAW and another is not.
+
+    Counters of cameras start anew in each folder, so that one name in two folders is two exposures as long as both are of
+    one kind; but cameras and people put the RAW of an exposure beside its JPG or in a folder of its own.
+    """
+    places, stems = defaultdict(list), defaultdict(list)
     for name in names:
-        exposures[PurePosixPath(name).with_suffix("").as_posix().casefold()].append(name)
-    twins = [" and ".join(n) for n in exposures.values() if len(n) > 1]
+        path = PurePosixPath(name)
+        places[path.with_suffix("").as_posix().casefold()].append(name)
+        stems[path.stem.casefold()].append(name)
+    groups = [g for g in stems.values() if len({is_raw(name) for name in g}) > 1]
+    parted = {name for group in groups for name in group}
+    groups += [g for g in places.values() if len(g) > 1 and not parted.issuperset(g)]
+    twins = [" and ".join(group) for group in sorted(groups)]
     if twins:
         raise InputError(
             f"There is more than one file of {len(twins)} exposures ({some(twins)}): pick one kind with FILTER, such as '*.jpg'."
