@@ -22,7 +22,7 @@ from ..photographs.listing import some
 from ..progress import SILENT, Progress
 from ..survey import Photograph, Survey, held
 from ..tiepoints.database import NAME
-from ..tiepoints.statistics import Statistics, micmac_statistics, weakest_link
+from ..tiepoints.statistics import micmac_statistics, weakest_link
 from . import selfcalibration as calibrating
 from .calibration import MODEL, read_calibration
 from .focal import CALIBRATION_SIGMA, FILE_SIGMA, FocalPrior, far_off
@@ -145,7 +145,10 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
     calibrating.drop_observations(model, entering, limit)
     model.update_point_3d_errors()
     progress.at(0.95)
-    statistics, ids = _statistics(model, entering)
+    kept = calibrating.observations(model)
+    ids = sorted(model.reg_image_ids(), key=lambda i: model.images[i].name)
+    photograph, track = calibrating.indexed(entering, ids)
+    statistics = micmac_statistics(photograph, track, entering.length, calibrating.among(entering, kept), len(ids))
     names = [network.names[i] for i in ids]
     missing = sorted({p.name for p in survey.photographs} - set(names))
     if missing:
@@ -155,7 +158,6 @@ def _orient(request: Request, survey: Survey, known: Mapping[str, Camera], progr
         model.write(part)
     for text in (doubt := far_off(model, priors, fixed)):
         progress.warn(text)
-    kept = calibrating.observations(model)
     link = _weak_link(kept, ids, names)
     if link:
         progress.warn(link)
@@ -223,9 +225,7 @@ def _drop_weak(model: pycolmap.Reconstruction) -> None:
 
 def _weak_link(found: calibrating.Observations, ids: list[int], names: list[str]) -> str:
     """Return a sentence on the weakest link of the block when it is weak, else nothing."""
-    index = {image: n for n, image in enumerate(ids)}
-    _, track = np.unique(found.point, return_inverse=True)
-    link = weakest_link(np.array([index[i] for i in found.image.tolist()], np.int64), track, len(ids))
+    link = weakest_link(*calibrating.indexed(found, ids), len(ids))
     if link is None or link[0] >= _WEAK_LINK:
         return ""
     apart = some(names[i] for i in link[1])
@@ -233,17 +233,3 @@ def _weak_link(found: calibrating.Observations, ids: list[int], names: list[str]
         f"Only {link[0]} points of three or more rays tie {apart} to the rest of the block: their scale and tilt against it are "
         "uncertain, so give control points on both sides."
     )
-
-
-def _statistics(model: pycolmap.Reconstruction, entering: calibrating.Observations) -> tuple[Statistics, list[int]]:
-    """Return the statistics of what entered the final adjustment, by photographs sorted by name, and their image ids."""
-    ids = sorted(model.reg_image_ids(), key=lambda i: model.images[i].name)
-    index = {image: n for n, image in enumerate(ids)}
-    kept = np.zeros(len(entering.image), bool)
-    for image in ids:
-        left = np.array(model.images[image].get_observation_point2D_idxs(), np.int64)
-        mine = entering.image == image
-        kept[mine] = np.isin(entering.keypoint[mine], left)
-    _, track = np.unique(entering.point, return_inverse=True)
-    photograph = np.array([index[i] for i in entering.image.tolist()], np.int64)
-    return micmac_statistics(photograph, track, entering.length, kept, len(ids)), ids

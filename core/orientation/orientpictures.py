@@ -15,9 +15,9 @@ from ..report.cloud import Cloud, cloud_from_above, cloud_in_perspective, levell
 from ..report.drawing import draw_tie_points
 from ..report.html import Report, new_figure
 from ..survey import Survey
-from ..tiepoints.statistics import MOST_RAYS, rays_per_point
+from ..tiepoints.statistics import MOST_RAYS
 from ..tiepoints.tiereport import COVERAGES, draw_coverages, tones
-from .selfcalibration import Observations
+from .selfcalibration import Observations, among
 
 Array = NDArray[np.float64]
 _GRID = 16  # cells of the residual field along the longer side
@@ -41,27 +41,18 @@ def sightings(
     model: pycolmap.Reconstruction, image_ids: Sequence[int], entering: Observations, kept: Observations
 ) -> list[Sightings]:
     """Return the sightings of each photograph, in the order of ``image_ids``."""
-    result = []
+    left, result = among(entering, kept), []
     for image_id in image_ids:
-        image = model.images[image_id]
-        keypoints = entering.keypoint[_part(entering, image_id)]
+        image, mine = model.images[image_id], _part(entering, image_id)
         points = image.points2D
-        xy = np.array([points[k].xy for k in keypoints.tolist()], float).reshape(-1, 2)
-        left = np.isin(keypoints, kept.keypoint[_part(kept, image_id)])
-        result.append(Sightings(image.name, image.camera.width, image.camera.height, image.camera_id, xy, left))
+        xy = np.array([points[k].xy for k in entering.keypoint[mine].tolist()], float).reshape(-1, 2)
+        result.append(Sightings(image.name, image.camera.width, image.camera.height, image.camera_id, xy, left[mine]))
     return result
 
 
 def _part(found: Observations, image_id: int) -> slice:
     """Return where the observations of one photograph stand, which are in the order of the ids."""
     return slice(*np.searchsorted(found.image, [image_id, image_id + 1]).tolist())
-
-
-def indexed(found: Observations, image_ids: Sequence[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the photograph (index in ``image_ids``) and the track, numbered from 0, of each observation."""
-    order = np.argsort(image_ids)
-    photograph = order[np.searchsorted(np.asarray(image_ids)[order], found.image)]
-    return photograph, np.unique(found.point, return_inverse=True)[1]
 
 
 def draw_residuals(
@@ -129,11 +120,12 @@ def residual_field(xy: Array, residual: Array, width: int, height: int) -> Array
     return np.column_stack([(full % _GRID + 0.5) * cell, (full // _GRID + 0.5) * cell, mean, chance])
 
 
-def draw_rays(report: Report, rays: NDArray[np.int64], found: Observations) -> None:
-    """Draw how many points have how many rays, in the block and in each photograph (``rays``: see ``ray_histograms``)."""
-    _, track = np.unique(found.point, return_inverse=True)
-    number = np.minimum(rays_per_point(found.image, track), MOST_RAYS)
-    points = np.bincount(number, minlength=MOST_RAYS + 1)[2:]
+def draw_rays(report: Report, per_point: NDArray[np.int64], rays: NDArray[np.int64]) -> None:
+    """Draw how many points have how many rays, in the block and in each photograph.
+
+    See ``rays_per_point`` and ``ray_histograms`` of the statistics.
+    """
+    points = np.bincount(np.minimum(per_point, MOST_RAYS), minlength=MOST_RAYS + 1)[2:]
     figure = new_figure(9.4, 3.4)
     left, right = figure.subplots(1, 2)
     numbers = np.arange(2, MOST_RAYS + 1)

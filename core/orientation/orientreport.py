@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ..camera import PARAMETERS
 from ..report.html import Report
 from ..survey import Survey
-from ..tiepoints.statistics import CELLS, MOST_RAYS, Statistics, cell_counts, ray_histograms
+from ..tiepoints.statistics import CELLS, MOST_RAYS, Statistics, cell_counts, ray_histograms, rays_per_point
 from . import orientpictures as pictures
 from .focal import FocalPrior
-from .selfcalibration import FILTER, Observations
+from .selfcalibration import FILTER, Observations, indexed
 
 Array = NDArray[np.float64]
 
@@ -67,11 +67,12 @@ def write_report(survey: Survey, model: pycolmap.Reconstruction, outcome: Orient
     _cameras(report, model, outcome)
     seen = pictures.sightings(model, outcome.image_ids, outcome.entering, outcome.observations)
     cells = np.stack([cell_counts(one.xy[one.kept], one.width, one.height) for one in seen])
-    rays = ray_histograms(*pictures.indexed(outcome.observations, outcome.image_ids), count)
+    photograph, track = indexed(outcome.observations, outcome.image_ids)
+    rays = ray_histograms(photograph, track, count)
     report.heading("Residuals")
     pictures.draw_residuals(report, model, outcome.image_ids, outcome.observations, seen, outcome.limit)
     report.heading("Rays")
-    pictures.draw_rays(report, rays, outcome.observations)
+    pictures.draw_rays(report, rays_per_point(photograph, track), rays)
     report.heading("The block")
     pictures.draw_block(report, model)
     pictures.draw_barest(report, survey, seen, cells)

@@ -6,7 +6,7 @@ middle: in fewer, and in one strip, it cannot be told from a tilt.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
@@ -84,6 +84,19 @@ def observations(model: pycolmap.Reconstruction) -> Observations:
         none = np.zeros(0, np.int64)
         return Observations(none, none, none, np.zeros((0, 2)))
     return Observations(np.concatenate(images), np.concatenate(keypoints), np.concatenate(points), np.concatenate(residuals))
+
+
+def indexed(found: Observations, image_ids: Sequence[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the photograph (index in ``image_ids``) and the track, numbered from 0, of each observation (n,)."""
+    order = np.argsort(image_ids)
+    photograph = order[np.searchsorted(np.asarray(image_ids)[order], found.image)]
+    return photograph, np.unique(found.point, return_inverse=True)[1]
+
+
+def among(found: Observations, others: Observations) -> NDArray[np.bool_]:
+    """Tell which observations (n,) are also among ``others``."""
+    mine, theirs = ((o.image << 32) + o.keypoint for o in (found, others))
+    return np.isin(mine, theirs)
 
 
 def robust_sigma(length: Array) -> float:

@@ -13,10 +13,13 @@ from strandline.core.orientation.orientpictures import residual_field
 from strandline.core.orientation.pointcloud import write_points
 from strandline.core.orientation.selfcalibration import (
     MODELS,
+    Observations,
     adjust,
+    among,
     camera_sigmas,
     convert_camera,
     drop_observations,
+    indexed,
     observations,
     principal_point_is_adjusted,
     robust_sigma,
@@ -296,3 +299,13 @@ def test_the_residual_field_is_the_mean_of_each_cell():
     field = residual_field(xy, residual, 160, 80)
     assert field[:, :4].tolist() == [[5.0, 5.0, 1.0, -1.0], [155.0, 5.0, 1.0, 0.0], [155.0, 75.0, 0.5, 0.0]]
     assert field[:, 4] == pytest.approx([0.0, 1 / 3, 0.0])
+
+
+def test_observations_are_indexed_by_photograph_and_track():
+    none = np.zeros((4, 2))
+    found = Observations(np.array([2, 2, 7, 9]), np.array([5, 8, 5, 0]), np.array([40, 30, 40, 30]), none)
+    photograph, track = indexed(found, [9, 2, 7])
+    assert photograph.tolist() == [1, 1, 2, 0]
+    assert track.tolist() == [1, 0, 1, 0]
+    kept = Observations(np.array([2, 9]), np.array([8, 5]), np.array([30, 30]), none[:2])
+    assert among(found, kept).tolist() == [False, True, False, False]
