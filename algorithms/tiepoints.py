@@ -56,6 +56,18 @@ class TiePoints(StepAlgorithm):
             ("auto", "exhaustive", "sequential"),
             default="auto",
         )
+        yield ask.advanced(
+            ask.choice(
+                "THRESHOLD",
+                tr("Threshold"),
+                tr(
+                    "noise: features that stand out of each photograph's own noise; fixed: features above one contrast for all "
+                    "photographs, as other programs take them, to compare with."
+                ),
+                ("noise", "fixed"),
+                default="noise",
+            )
+        )
         yield ask.workers()
         yield ask.scheduler()
         yield ask.report()

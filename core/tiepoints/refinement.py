@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..files import bytes_digest, digest, whole
 from ..progress import Progress
 from .features import read_features
-from .images import read_grey, reduced, reduced_size
+from .images import SearchedImage
 from .leastsquares import cut_patches, holds_patch, match_patches
 from .pairs import Pair
 from .tracks import within_tracks
@@ -41,28 +41,13 @@ _ZOOMED = 2.0  # factor between that homography's local zoom and the keypoints' 
 
 @dataclass(frozen=True)
 class Source:
-    """Where a photograph's keypoints come from.
+    """Where a photograph's keypoints come from: the image searched, and what ``write_features`` wrote.
 
-    ``image`` is the file searched and ``photograph`` its description when it is none of ``enhance``, as ``read_grey`` takes them;
-    ``max_size`` is the longer side to which it was reduced (0: not); ``features`` is what ``write_features`` wrote, under a name
-    that stands for all this; ``size`` is the photograph's width and height.
+    The name of the features' file stands for the content of both.
     """
 
-    image: str
-    photograph: dict[str, Any] | None
-    max_size: int
+    image: SearchedImage
     features: Path
-    size: tuple[int, int]
-
-    @property
-    def working_size(self) -> tuple[int, int]:
-        """Width and height of the image searched."""
-        return reduced_size(self.size, self.max_size)
-
-    @property
-    def reduction(self) -> NDArray[np.float32]:
-        """Pixels of the image searched per pixel of the photograph, along x and y (2,)."""
-        return np.divide(self.working_size, self.size, dtype=np.float32)
 
 
 @dataclass(frozen=True)
@@ -92,8 +77,8 @@ def choose_references(
         np.add.at(degrees[j], inside[:, 1], 1)
     for i, (source, track) in enumerate(zip(sources, tracks, strict=True)):
         xy = read_features(source.features).xy
-        index = np.flatnonzero((track >= 0) & holds_patch(xy * source.reduction, source.working_size))
-        score = degrees[i][index] + 1 - np.linalg.norm(xy[index] / np.array(source.size) - 0.5, axis=1)
+        index = np.flatnonzero((track >= 0) & holds_patch(xy * source.image.reduction, source.image.working_size))
+        score = degrees[i][index] + 1 - np.linalg.norm(xy[index] / np.array(source.image.size) - 0.5, axis=1)
         better = score > best[track[index]]
         index, score = index[better], score[better]
         best[track[index]], photograph[track[index]], keypoint[track[index]] = score, i, index
@@ -188,15 +173,15 @@ def affinities(first: NDArray[np.float32], second: NDArray[np.float32], longer: 
 def _working_keypoints(source: Source) -> NDArray[np.float32]:
     """Return keypoints (n, 4) in pixels of the image searched."""
     keypoints = read_features(source.features).keypoints()
-    keypoints[:, :2] *= source.reduction
-    keypoints[:, 2] *= source.reduction.mean()
+    keypoints[:, :2] *= source.image.reduction
+    keypoints[:, 2] *= source.image.reduction.mean()
     return keypoints
 
 
 def _cut_references(source: Source, index: Indices, path: str) -> None:
     """Write the patches around the keypoints ``index`` of a photograph, and these keypoints."""
     keypoints = _working_keypoints(source)[index]
-    image = reduced(read_grey(source.image, source.photograph), source.max_size)
+    image = source.image.read_reduced()
     with whole(Path(path)) as part, part.open("wb") as stream:
         np.savez(stream, patches=cut_patches(image, keypoints[:, :2]), keypoints=keypoints)
 
@@ -208,7 +193,7 @@ def _search_references(source: Source, own: Indices, parts: Sequence[tuple[str, 
     """
     keypoints = _working_keypoints(source)
     kept, places = [own], [keypoints[own, :2]]
-    image = reduced(read_grey(source.image, source.photograph), source.max_size) if parts else np.zeros((1, 1), np.uint8)
+    image = source.image.read_reduced() if parts else np.zeros((1, 1), np.uint8)
     for name, index, rows in parts:
         with np.load(name, allow_pickle=False) as data:
             patches, theirs = data["patches"][rows], data["keypoints"][rows]
@@ -220,4 +205,4 @@ def _search_references(source: Source, own: Indices, parts: Sequence[tuple[str, 
         kept.append(index[good])
         places.append(place[good])
     with whole(Path(path)) as part, part.open("wb") as stream:
-        np.savez(stream, keypoint=np.concatenate(kept), xy=(np.concatenate(places) / source.reduction).astype(np.float32))
+        np.savez(stream, keypoint=np.concatenate(kept), xy=(np.concatenate(places) / source.image.reduction).astype(np.float32))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,16 +13,15 @@ import numpy as np
 from ..camera import Camera
 from ..contract import decode, encode
 from ..errors import InputError, NotEnoughData
-from ..files import digest, file_digest, remove
+from ..files import digest, remove
 from ..parallel import run_calls
-from ..photographs.enhance import enhanced_path
 from ..photographs.listing import some
 from ..progress import SILENT, Progress
 from ..survey import Photograph, Survey, held
 from . import features, matching
 from .database import NAME, provisional_camera, write_database
 from .features import read_features
-from .images import read_grey
+from .images import SearchedImage, searched_image
 from .matching import PairMatches
 from .pairs import Pair, blocks, choose_pairs, pairs_through_others
 from .refinement import Source, read_refined, refine_keypoints
@@ -35,13 +35,17 @@ _TRUSTED = 50  # matches from which a pair may tell where a third photograph lie
 
 @dataclass(frozen=True)
 class Request:
-    """``max_features`` 0 is no limit; ``max_size`` is the longer side in pixels features are looked for at, 0 is full."""
+    """``max_features`` 0 is no limit; ``max_size`` is the longer side in pixels features are looked for at, 0 is full.
+
+    ``threshold`` "noise" takes what stands out of each photograph's own noise, "fixed" what exceeds one contrast for all.
+    """
 
     survey: str
     source: Literal["auto", "enhanced", "original"] = "auto"
     max_features: int = 20000
     max_size: int = 0
     pairs: Literal["auto", "exhaustive", "sequential"] = "auto"
+    threshold: Literal["noise", "fixed"] = "noise"
     workers: int = 0
     scheduler: str | None = None
     output_html_file: str | None = None
@@ -82,18 +86,15 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         if len(photographs) < 2:
             raise NotEnoughData(f"The survey {survey.folder} has {len(photographs)} photograph: tie points need two or more.")
         enhanced = _use_enhanced(request, survey, progress)
-        images = [enhanced_path(survey, p) if enhanced else survey.path(p) for p in photographs]
+        images = [searched_image(survey, p, enhanced=enhanced, max_size=request.max_size) for p in photographs]
         cache = survey.folder.absolute() / CACHE
-        found = _features(request, photographs, images, enhanced, cache / "features", progress.part(0.0, 0.4))
+        found = _features(request, images, cache / "features", progress.part(0.0, 0.4))
         counts = [len(read_features(path)) for path in found]
         if min(counts) == 0:
             empty = [p.name for p, n in zip(photographs, counts, strict=True) if n == 0]
             progress.warn(f"No features were found in {some(empty)}.")
         pairs, rule, keys = _pairs(request, photographs, found, cache / "matches", progress.part(0.4, 0.7))
-        sources = [
-            Source(str(i.absolute()), None if enhanced else encode(p), request.max_size, f, (p.width, p.height))
-            for i, p, f in zip(images, photographs, found, strict=True)
-        ]
+        sources = [Source(image, path) for image, path in zip(images, found, strict=True)]
         pairs, refined = _refine(request, sources, pairs, cache / "refined", progress.part(0.7, 0.95))
         if not pairs:
             raise NotEnoughData(
@@ -110,7 +111,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         write_report(
             survey,
             photographs,
-            images if enhanced else None,
+            [image.path for image in images] if enhanced else None,
             found,
             pairs,
             rule=rule,
@@ -127,6 +128,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
                 "max_features": request.max_features,
                 "max_size": request.max_size,
                 "pairs": request.pairs,
+                "threshold": request.threshold,
             },
             result={"mean_features": result.mean_features, "pair_count": len(pairs), "match_count": match_count},
         )
@@ -148,42 +150,24 @@ def _use_enhanced(request: Request, survey: Survey, progress: Progress) -> bool:
     return False
 
 
-def _features(
-    request: Request, photographs: Sequence[Photograph], images: Sequence[Path], enhanced: bool, folder: Path, progress: Progress
-) -> list[Path]:
-    """Return the file with the features of each photograph, after making those that are missing."""
-    parameters = [features.VERSION, request.max_features, request.max_size]
-    contents = [file_digest(path) if enhanced else [p.digest, "original"] for path, p in zip(images, photographs, strict=True)]
-    paths = [folder / f"{digest(content, parameters)}.npz" for content in contents]
+def _features(request: Request, images: Sequence[SearchedImage], folder: Path, progress: Progress) -> list[Path]:
+    """Return the file with the features of each image, after making those that are missing."""
+    parameters = [features.VERSION, request.max_features, request.threshold]
+    paths = [folder / f"{digest(image.content(), parameters)}.npz" for image in images]
     missing = [i for i, path in enumerate(paths) if not path.is_file()]
     if len(missing) < len(paths):
         progress.info(f"The features of {len(paths) - len(missing)} of {len(paths)} photographs stand already.")
-    calls = (
-        (
-            str(images[i].absolute()),
-            None if enhanced else encode(photographs[i]),
-            str(paths[i]),
-            request.max_features,
-            request.max_size,
-        )
-        for i in missing
-    )
-    for _ in run_calls(
-        _find_features,
-        calls,
-        workers=request.workers,
-        scheduler=request.scheduler,
-        progress=progress,
-        total=len(missing),
-    ):
-        pass
+    calls = ((images[i], str(paths[i]), request.max_features, request.threshold) for i in missing)
+    _run_all(request, _find_features, calls, len(missing), progress)
     return paths
 
 
-def _find_features(image: str, photograph: dict[str, Any] | None, path: str, max_features: int, max_size: int) -> None:
-    """Write the features of an enhanced image, or of the photograph that ``photograph`` describes."""
-    grey = read_grey(image, photograph)
-    features.write_features(Path(path), features.detect(grey, max_features=max_features, max_size=max_size))
+def _find_features(image: SearchedImage, path: str, max_features: int, threshold: Literal["noise", "fixed"]) -> None:
+    """Write the features of an image."""
+    found = features.detect(
+        image.read(), max_features=max_features, max_size=image.max_size, threshold=threshold, mask=image.read_mask()
+    )
+    features.write_features(Path(path), found)
 
 
 def _pairs(
@@ -202,8 +186,7 @@ def _pairs(
         calls = ((str(found[i]), str(found[j]), cameras[i], cameras[j], str(paths[i, j]), wanted[i, j][1]) for i, j in missing)
         # To start workers takes longer than a few pairs.
         workers = 1 if len(missing) < _FEW and not request.scheduler else request.workers
-        for _ in run_calls(_match_files, calls, workers=workers, scheduler=request.scheduler, progress=part, total=len(missing)):
-            pass
+        _run_all(replace(request, workers=workers), _match_files, calls, len(missing), part)
         result = {pair: matching.read_matches(path) for pair, path in paths.items()}
         return {pair: m for pair, m in result.items() if len(m.matches)}
 
@@ -239,11 +222,7 @@ def _refine(
     matches = {pair: m.matches for pair, m in pairs.items()}
     tracks = build_tracks(matches, {pair: m.likeness for pair, m in pairs.items()}, counts)
 
-    def run_all(function: Callable[..., None], calls: Iterable[tuple[Any, ...]], total: int, part: Progress) -> None:
-        for _ in run_calls(function, calls, workers=request.workers, scheduler=request.scheduler, progress=part, total=total):
-            pass
-
-    refined = refine_keypoints(sources, tracks, matches, folder=folder, run=run_all, progress=progress)
+    refined = refine_keypoints(sources, tracks, matches, folder=folder, run=partial(_run_all, request), progress=progress)
     tied = [np.where(read_refined(s, path)[1], track, -1) for s, path, track in zip(sources, refined, tracks, strict=True)]
     kept = {}
     for (i, j), pair in pairs.items():
@@ -251,6 +230,14 @@ def _refine(
         if inside.sum() >= matching.LEAST:
             kept[i, j] = replace(pair, matches=pair.matches[inside], likeness=pair.likeness[inside])
     return kept, refined
+
+
+def _run_all(
+    request: Request, function: Callable[..., None], calls: Iterable[tuple[Any, ...]], total: int, progress: Progress
+) -> None:
+    """Make calls of a function that returns nothing."""
+    for _ in run_calls(function, calls, workers=request.workers, scheduler=request.scheduler, progress=progress, total=total):
+        pass
 
 
 def _apart(photographs: Sequence[Photograph], groups: list[list[int]]) -> str:
