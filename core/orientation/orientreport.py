@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..camera import PARAMETERS
 from ..report.html import Report
 from ..survey import Survey
-from ..tiepoints.statistics import CELLS, MOST_RAYS, Statistics, cell_counts, ray_histograms, rays_per_point
+from ..tiepoints.statistics import CELLS, Statistics, cell_counts, ray_histograms, rays_per_point
 from . import orientpictures as pictures
 from .focal import FocalPrior
 from .selfcalibration import FILTER, Observations, indexed
@@ -68,28 +68,28 @@ def write_report(survey: Survey, model: pycolmap.Reconstruction, outcome: Orient
     seen = pictures.sightings(model, outcome.image_ids, outcome.entering, outcome.observations)
     cells = np.stack([cell_counts(one.xy[one.kept], one.width, one.height) for one in seen])
     photograph, track = indexed(outcome.observations, outcome.image_ids)
-    rays = ray_histograms(photograph, track, count)
+    per_point, rays = rays_per_point(photograph, track), ray_histograms(photograph, track, count)
+    kept = np.bincount(photograph, minlength=count)
+    mean_rays = np.bincount(photograph, weights=per_point[track], minlength=count) / np.maximum(kept, 1)
     report.heading("Residuals")
     pictures.draw_residuals(report, model, outcome.image_ids, outcome.observations, seen, outcome.limit)
     report.heading("Rays")
-    pictures.draw_rays(report, rays_per_point(photograph, track), rays)
+    pictures.draw_rays(report, per_point, rays)
     report.heading("The block")
     pictures.draw_block(report, model)
     pictures.draw_barest(report, survey, seen, cells)
     report.heading("Photographs")
     rows = []
-    for name, p, of_photograph, by_rays in zip(names, s.photographs, cells, rays, strict=True):
+    for name, p, of_photograph, mean in zip(names, s.photographs, cells, mean_rays.tolist(), strict=True):
         percent = 100.0 * p.kept / p.observations if p.observations else None
         multi = 100.0 * p.multi_kept / p.multi if p.multi else None
         covered = 100.0 * np.count_nonzero(of_photograph) / CELLS**2
-        mean = float(by_rays @ np.arange(len(by_rays)) / by_rays.sum()) if by_rays.sum() else None
         rows.append((name, p.observations, percent, p.multi, multi, p.rms, mean, covered))
     report.table(
         ["name", "tie points", "kept (%)", "of 3 or more rays", "kept (%)", "residual (px)", "mean rays", "coverage (%)"], rows
     )
     report.text(
-        f"Rays and coverage are those of the points kept: {MOST_RAYS} rays and more count as {MOST_RAYS}, and coverage is the "
-        f"share of {CELLS} x {CELLS} cells with one or more."
+        f"Rays and coverage are those of the points kept; coverage is the share of {CELLS} x {CELLS} cells with one or more."
     )
     report.save(survey.report_path("orient"), copy)
 
