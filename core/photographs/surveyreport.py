@@ -11,6 +11,7 @@ from pyproj import CRS
 from ..frames import transformer
 from ..report.html import Report, new_figure
 from ..survey import Photograph, Survey
+from .reading import is_raw
 
 _LABELS = 40  # photographs up to which the map names each one
 
@@ -38,6 +39,11 @@ def write_report(survey: Survey, notes: list[str], copy: Path | str | None) -> N
         "Positions are WGS 84 degrees. The vertical datum of GNSS heights is not known from the photographs. A position with its "
         "height is EXIF's; where the XMP has the sigmas of an RTK receiver it is the XMP's. A POSITIONS table replaces both."
     )
+    if any(is_raw(p.name) for p in photographs):
+        report.text(
+            "RAW photographs are used as the sensor saw them, proportional to light. Width and height are those of the frame that "
+            "the camera gives its JPG: the one the file names, else that of its full preview, else all the sensor sees."
+        )
     report.save(survey.report_path("createsurvey"), copy)
 
 
