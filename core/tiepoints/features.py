@@ -1,13 +1,16 @@
-"""Features of one photograph: SIFT (Lowe 2004) with RootSIFT descriptors (Arandjelovic & Zisserman 2012), evenly spread.
+"""Features of one photograph: SIFT (Lowe 2004) with a threshold that follows the noise, evenly spread.
 
-The search starts at the photograph's own pixels, not at twice their number as Lowe's: on sand the finest octave holds the
-sensor's noise, and leaving it out costs no tie point while it saves three quarters of time and memory.
+A fixed contrast would take noise for features where a photograph is noisy or its contrast enhanced, and leave out faint
+coarse features that stand clear of it. The search starts at the photograph's own pixels; only where these give fewer
+features than wanted does it go on to twice their number, as Lowe's, at four times the cost.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -15,14 +18,19 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import whole
+from .descriptors import SUPPORT, describe
+from .noise import NoiseMap, noise_gain, noise_map
+from .scalespace import LAYERS, Octave, differences, extrema, finer_octave, gaussians, layer_of, octaves, sigma_of
 
-VERSION = 1  # part of the key under which features are kept: raise it when the same image would give others
-_LAYERS = 3  # scales per octave, as Lowe's
-_CONTRAST = 0.002  # a twentieth of OpenCV's default: sand has little; the grid keeps the best of what is found
-_EDGE = 10.0
-_SIGMA = 1.6
+Threshold = Literal["noise", "fixed"]
+
+VERSION = 2  # part of the key under which features are kept: raise it when the same image would give others
+_TIMES_NOISE = 3.0  # white noise gives fewer than 100 features per megapixel above it, and half of all without it
+_FAINTEST = 0.02  # grey levels: less than three times what the least noise leaves at the coarsest scale of an octave
+_FIXED = 0.01 * 255 / LAYERS  # grey levels: the contrast 0.01 as OpenCV counts it
 _CELLS = 32  # cells along the longer side among which the features are shared out
-_UNIT = 512.0  # descriptor norm in 8 bits; no element of a RootSIFT reaches 255
+_LEAST = 16  # pixels of the shorter side of the smallest image that is searched
+_FOUND = np.dtype([("xy", np.float32, 2), ("scale", np.float32), ("score", np.float32), ("pixel", np.float32)])
 
 
 @dataclass(frozen=True)
@@ -42,40 +50,60 @@ class Features:
         """Return the number of features."""
         return len(self.xy)
 
+    @classmethod
+    def none(cls) -> Features:
+        """Return what a blank image has."""
+        nothing = np.zeros(0, np.float32)
+        return cls(np.zeros((0, 2), np.float32), nothing, nothing, np.zeros((0, 128), np.uint8))
+
     def keypoints(self) -> NDArray[np.float32]:
         """Return x, y, scale, angle (n, 4), as a COLMAP database holds them."""
         return np.column_stack([self.xy, self.scale, self.angle])
 
 
-def detect(image: NDArray[np.uint8], *, max_features: int, max_size: int) -> Features:
+def detect(
+    image: NDArray[np.uint8],
+    *,
+    max_features: int,
+    max_size: int,
+    threshold: Threshold = "noise",
+    mask: NDArray[np.bool_] | None = None,
+) -> Features:
     """Return the features of a grey image (rows, columns).
 
-    ``max_features`` 0 keeps all; ``max_size`` is the longer side (pixels) of the image searched, 0 the image as it is.
+    Parameters
+    ----------
+    image
+        The photograph, or its enhanced image.
+    max_features
+        Largest number of features, spread over the image; 0 for all.
+    max_size
+        Longer side (pixels) of the image searched; 0 for the image as it is.
+    threshold
+        The contrast a feature needs: ``noise``, three times what the noise where it stands leaves at its scale; ``fixed``,
+        0.01 as OpenCV counts it.
+    mask
+        Where features may lie (rows, columns). None is found whose descriptor reaches out of it, or to where the
+        image is clipped.
     """
-    height, width = image.shape
-    longer = max(width, height)
-    wanted = min(max_size, longer) if max_size else longer
-    # OpenCV always starts at twice the pixels it is given, so it is given half of those wanted.
-    size = (max(1, round(width * wanted / longer / 2)), max(1, round(height * wanted / longer / 2)))
-    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    factor = np.array([width / size[0], height / size[1]], np.float32)
-    sift = cv2.SIFT.create(0, _LAYERS, _CONTRAST, _EDGE, _SIGMA, True)
-    found = sift.detect(small)
-    if not found:
-        empty = np.zeros(0, np.float32)
-        return Features(np.zeros((0, 2), np.float32), empty, empty, np.zeros((0, 128), np.uint8))
-    # The order OpenCV finds them in is not promised; an order by their numbers is the same anywhere.
-    numbers = np.array([(*k.pt, k.size, k.angle, k.response) for k in found], np.float32)
-    order = np.lexsort(tuple(numbers.T))
-    best = order[spread(numbers[order, :2], numbers[order, 4], size, max_features or len(found))]
-    kept, described = sift.compute(small, [found[i] for i in best])
-    numbers = np.array([(*k.pt, k.size, k.angle) for k in kept], np.float32)
-    return Features(
-        (numbers[:, :2] + np.float32(0.5)) * factor,  # OpenCV counts from the centre of the first pixel
-        numbers[:, 2] / 2 * factor.mean(),  # OpenCV's size is a diameter
-        np.radians(numbers[:, 3]),
-        root_sift(described),
-    )
+    small, factor = _reduced(image, max_size)
+    if min(small.shape) < _LEAST:
+        return Features.none()
+    free = _free_radius(small, mask)
+    noise = noise_map(small)
+    found = np.concatenate([_search(octave, noise, free, threshold) for octave in octaves(small)])
+    finer = not max_features or len(found) < max_features
+    if finer:
+        found = np.concatenate([_search(finer_octave(small), noise, free, threshold), found])
+    if max_features:
+        width, height = small.shape[::-1]
+        found = found[spread(found["xy"], found["score"], (width, height), max_features)]
+    angle = np.empty(len(found), np.float32)
+    descriptors = np.empty((len(found), 128), np.uint8)
+    for octave in chain([finer_octave(small)] if finer else [], octaves(small)):
+        own = np.flatnonzero(found["pixel"] == octave.pixel)
+        angle[own], descriptors[own] = _described(octave, found[own])
+    return Features(found["xy"] * factor, found["scale"] * factor.mean(), angle, descriptors)
 
 
 def spread(xy: NDArray[np.float32], score: NDArray[np.float32], size: tuple[int, int], count: int) -> NDArray[np.intp]:
@@ -93,12 +121,6 @@ def spread(xy: NDArray[np.float32], score: NDArray[np.float32], size: tuple[int,
     rank = np.empty(len(xy), np.int64)
     rank[order] = np.arange(len(xy)) - np.repeat(starts, np.diff(starts, append=len(xy)))
     return np.sort(np.lexsort((-score, rank))[:count])
-
-
-def root_sift(descriptors: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return RootSIFT of SIFT descriptors (n, 128): the square root of the L1-normalised, in 8 bits."""
-    total = np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-9)
-    return np.clip(np.rint(_UNIT * np.sqrt(descriptors / total)), 0, 255).astype(np.uint8)
 
 
 def write_features(path: Path, features: Features) -> None:
@@ -120,3 +142,64 @@ def read_features(path: Path) -> Features:
             return Features(data["xy"], data["scale"], data["angle"], data["descriptors"])
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"The features {path} cannot be read ({error}): delete them and run strandline:tiepoints.") from error
+
+
+def _reduced(image: NDArray[np.uint8], max_size: int) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Return the image searched, and the sides (x, y) of its pixels in those of ``image``."""
+    height, width = image.shape
+    longer = max(width, height)
+    if not max_size or max_size >= longer:
+        return image, np.ones(2, np.float32)
+    size = (max(1, round(width * max_size / longer)), max(1, round(height * max_size / longer)))
+    small = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    return small, np.array([width / size[0], height / size[1]], np.float32)
+
+
+def _free_radius(image: NDArray[np.uint8], mask: NDArray[np.bool_] | None) -> NDArray[np.float32] | None:
+    """Return each pixel's distance (pixels) to the next where no feature may lie; None where there is none."""
+    # A single black or white pixel may be noise; a square of three is clipped.
+    clipped = ((image == 0) | (image == 255)).astype(np.uint8)
+    free = 1 - cv2.morphologyEx(clipped, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    if mask is not None:
+        share = cv2.resize(mask.astype(np.uint8) * np.uint8(255), image.shape[::-1], interpolation=cv2.INTER_AREA)
+        free &= share == 255
+    return None if free.all() else np.asarray(cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE), np.float32)
+
+
+def _search(octave: Octave, noise: NoiseMap, free: NDArray[np.float32] | None, threshold: Threshold) -> NDArray[Any]:
+    """Return the features of an octave, in pixels of the image searched; ``score`` is their contrast over its noise."""
+    pixel = np.float32(octave.pixel)
+    parts = []
+    for strip in differences(octave):
+        column, row, layer, contrast = extrema(strip, _FIXED if threshold == "fixed" else _FAINTEST).T
+        part = np.empty(len(column), _FOUND)
+        part["xy"] = np.column_stack([column, row]) * pixel + np.float32(0.5)
+        part["scale"] = sigma_of(layer) * pixel
+        part["pixel"] = pixel
+        part["score"] = np.abs(contrast) / (noise.at(part["xy"]) * noise_gain(part["scale"]))
+        if threshold == "noise":
+            part = part[part["score"] >= _TIMES_NOISE]
+        if free is not None:
+            x, y = part["xy"].astype(np.int64).T
+            part = part[free[y, x] > SUPPORT * part["scale"]]
+        parts.append(part)
+    found = np.concatenate(parts)
+    # Two searches may end at one place, with the same numbers.
+    _, first = np.unique(np.ascontiguousarray(found["xy"]).view(np.uint64), return_index=True)
+    return found[np.sort(first)]
+
+
+def _described(octave: Octave, found: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Return orientation and descriptor of an octave's features."""
+    pixel = np.float32(octave.pixel)
+    column, row = ((found["xy"] - np.float32(0.5)) / pixel).T
+    sigma = np.asarray(found["scale"] / pixel, np.float32)
+    layer = layer_of(sigma)
+    angle = np.empty(len(found), np.float32)
+    descriptors = np.empty((len(found), 128), np.uint8)
+    for strip in gaussians(octave):
+        own = np.flatnonzero((np.rint(row) >= strip.first) & (np.rint(row) < strip.last))
+        angle[own], descriptors[own] = describe(
+            strip.layers, column[own], row[own] - np.float32(strip.top), layer[own], sigma[own]
+        )
+    return angle, descriptors

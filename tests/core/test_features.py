@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from strandline.core.errors import InputError
-from strandline.core.tiepoints.features import detect, read_features, root_sift, spread, write_features
+from strandline.core.tiepoints.features import detect, read_features, spread, write_features
 
 
 def blobs(centres, size, sigma=4.0):
@@ -80,10 +80,3 @@ def test_every_cell_gives_its_best_in_turn():
     assert spread(xy, score, (320, 200), 3).tolist() == [1, 3, 4]
     assert spread(xy, score, (320, 200), 4).tolist() == [1, 2, 3, 4]
     assert spread(xy, score, (320, 200), 9).tolist() == [0, 1, 2, 3, 4]
-
-
-def test_root_sift_by_hand():
-    descriptor = np.zeros((1, 128), np.float32)
-    descriptor[0, :16] = 5.0  # a sixteenth of the sum each: its root is a quarter
-    assert root_sift(descriptor)[0, :17].tolist() == [128] * 16 + [0]
-    assert int((root_sift(descriptor).astype(int) ** 2).sum()) == 512**2
