@@ -19,8 +19,8 @@ class SimulateSurvey(StepAlgorithm):
             "tools",
             tr("Simulate survey"),
             tr(
-                "Renders the photographs of a flight over an invented beach, with ground points, marks, zones, and the true "
-                "surfaces and volumes: to learn the steps, to plan a flight, or to see what accuracy to expect."
+                "Renders the photographs of a flight over an invented beach, each as RAW and as JPG, with ground points, marks, "
+                "zones, and the true surfaces and volumes: to learn the steps, to plan a flight, or to see what to expect of it."
             ),
         )
 
@@ -54,12 +54,15 @@ class SimulateSurvey(StepAlgorithm):
         yield ask.number(
             "CONTRAST",
             tr("Contrast"),
-            tr("Standard deviation of the sand's brightness relative to its mean: 0.04 is dry sand under an even sky."),
+            tr(
+                "Standard deviation of the sand's own brightness relative to its mean, over features from 2 cm to 3 m: 0.04 is "
+                "common, 0.012 very bare. Slopes and ripples add their shading."
+            ),
             default=0.04,
             most=1.0,
         )
         yield ask.number(
-            "NOISE", tr("Noise"), tr("Of the sensor: 1 is a small drone camera at its lowest ISO, 0 is none."), default=1.0
+            "NOISE", tr("Noise"), tr("Of light and sensor: 1 is a small drone camera at its lowest ISO, 0 is none."), default=1.0
         )
         yield ask.number("GNSS_SIGMA_H", tr("GNSS accuracy in plan (m)"), tr("Of the photographs' positions."), default=0.03)
         yield ask.number("GNSS_SIGMA_V", tr("GNSS accuracy in height (m)"), tr("Of the photographs' positions."), default=0.05)
@@ -67,7 +70,7 @@ class SimulateSurvey(StepAlgorithm):
         yield ask.integer("CHECK_COUNT", tr("Check points"), tr("Targets laid out as check points."), default=4)
         yield ask.integer("SEED", tr("Seed"), tr("The same number gives the same survey."), default=1)
         yield ask.folder_output(
-            "OUTPUT", tr("Folder"), tr("Folder to make, with photographs, ground points, marks, zones and truth.")
+            "OUTPUT", tr("Folder"), tr("Folder to make, with photographs (jpg, raw), ground points, marks, zones and truth.")
         )
         yield ask.workers()
         yield ask.scheduler()

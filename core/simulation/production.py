@@ -127,9 +127,10 @@ def produce(request: Request, beach: Beach, folder: Path, progress: Progress) ->
         request.output_html_file,
         beach=beach,
         gsd=setting.gsd,
-        flights={date.day: (date.views, date.targets, folder / date.day / "jpg") for date in dates},
+        flights={date.day: (date.views, date.targets, folder / date.day) for date in dates},
         plan=setting.plan,
         volumes=volumes,
+        noise=request.noise,
     )
     total = volumes[-1] if volumes else None
     return {

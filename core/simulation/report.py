@@ -12,6 +12,7 @@ from PIL import Image
 from ..block import View
 from ..report.html import Report, new_figure
 from ..report.relief import exaggeration, heights_drawn, hillshade
+from . import exposure
 from .flight import Plan, expected_precision
 from .ground import Targets
 from .terrain import ZONES, Beach
@@ -42,8 +43,9 @@ def write_report(
     flights: dict[str, tuple[list[View], Targets, Path]],
     plan: Plan,
     volumes: list[Volumes],
+    noise: float,
 ) -> None:
-    """Write the page; ``flights`` maps a date to its views (beach coordinates), targets and photographs' folder."""
+    """Write the page; ``flights`` maps a date to its views (beach coordinates), targets and folder."""
     first = next(iter(flights))
     views = flights[first][0]
     a, c, sigma, count = precision_map(beach, views)
@@ -58,9 +60,10 @@ def write_report(
     )
     for date, (views_of, _, folder) in flights.items():
         middle = views_of[len(views_of) // 2].name
-        with Image.open(folder / middle) as picture:
+        with Image.open(folder / "jpg" / middle) as picture:
             picture.thumbnail((_PICTURE, _PICTURE))
             report.picture(np.asarray(picture.convert("RGB")), f"Photograph {middle} of {date}.")
+    exposure.tell(report, flights[first][2], Path(views[len(views) // 2].name).stem, noise=noise, contrast=beach.contrast)
     report.heading("The flight")
     report.table(
         ("quantity", "value"),

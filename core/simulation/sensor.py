@@ -36,7 +36,7 @@ def expose(light: NDArray[np.float32], exposure: float, noise: float, random: np
     drawn = random.standard_normal((rows, columns), np.float32) if noise else np.zeros((rows, columns), np.float32)
     mosaic = np.empty((rows, columns), np.uint16)
     answers = _TINTS * np.array(NEUTRAL, np.float32) * np.float32(exposure * SAND_LEVEL * FULL_WELL)
-    _read_out(light, drawn, answers, PATTERN, noise, mosaic)
+    _read_out(light, vignette(rows, columns), drawn, answers, PATTERN, noise, mosaic)
     return mosaic
 
 
@@ -58,14 +58,26 @@ def demosaic(mosaic: NDArray[np.uint16], gains: NDArray[np.float64]) -> NDArray[
     return np.asarray(cv2.cvtColor(framed, cv2.COLOR_BayerRGGB2RGB_EA)[2:-2, 2:-2], np.uint16)
 
 
+def linear(photograph: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Return the light (0..1, same shape) that ``develop`` makes the grey levels of."""
+    grey = np.arange(256) / 255.0
+    return np.asarray(np.where(grey < 0.081, grey / 4.5, ((grey + 0.099) / 1.099) ** (1 / 0.45))[photograph])
+
+
+def vignette(rows: int, columns: int) -> NDArray[np.float32]:
+    """Return the share of the light (rows, columns) that the lens lets through."""
+    y, x = np.arange(rows)[:, None] + 0.5 - rows / 2, np.arange(columns)[None] + 0.5 - columns / 2
+    return np.asarray(1.0 - _VIGNETTING * (x * x + y * y) / ((rows**2 + columns**2) / 4), np.float32)
+
+
 def noise_level(electrons: float, noise: float) -> float:
     """Return the standard deviation (DN) of pixels of a mosaic with that mean."""
     return math.sqrt((noise / ELECTRONS) ** 2 * (electrons + READ_NOISE**2) + 1 / 12)
 
 
-def sand_electrons(exposure: float = 1.0) -> tuple[float, float, float]:
-    """Return the mean electrons of dry flat sand in red, green, blue, in the photograph's middle."""
-    red, green, blue = (float(t) * n * exposure * SAND_LEVEL * FULL_WELL for t, n in zip(_TINTS[0], NEUTRAL, strict=True))
+def sand_electrons() -> tuple[float, float, float]:
+    """Return the mean electrons of dry flat sand in red, green, blue, in the photograph's middle under exposure 1."""
+    red, green, blue = (float(t) * n * SAND_LEVEL * FULL_WELL for t, n in zip(_TINTS[0], NEUTRAL, strict=True))
     return red, green, blue
 
 
@@ -77,18 +89,14 @@ def _curve() -> NDArray[np.uint8]:
 
 
 @njit(cache=True, nogil=True)
-def _read_out(light: Any, drawn: Any, answers: Any, pattern: Any, noise: float, out: Any) -> None:
-    rows, columns = out.shape
-    reach = (rows * rows + columns * columns) / 4.0
-    for i in range(rows):
-        y = i + 0.5 - rows / 2
-        for j in range(columns):
-            x = j + 0.5 - columns / 2
+def _read_out(light: Any, fall: Any, drawn: Any, answers: Any, pattern: Any, noise: float, out: Any) -> None:
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
             colour = pattern[i % 2, j % 2]
             mean = 0.0
             for plane in range(light.shape[0]):
                 mean += light[plane, i, j] * answers[plane, colour]
-            mean *= 1.0 - _VIGNETTING * (x * x + y * y) / reach
+            mean *= fall[i, j]
             signal = mean + noise * math.sqrt(mean + READ_NOISE**2) * drawn[i, j]
             out[i, j] = int(min(max(BLACK + signal / ELECTRONS, 0.0), float(WHITE)) + 0.5)
 

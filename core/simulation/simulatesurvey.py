@@ -24,7 +24,8 @@ class Request:
 
     ``length`` is along the shore, ``width`` across it. ``height`` is that of the flight above the beach; ``tilt`` the standard
     deviation of the camera's tilt. ``crs`` is a projected CRS in metres. ``contrast`` is the standard deviation of the sand's
-    reflectance relative to its mean. ``noise`` scales shot and read noise (1 = a small drone camera at base ISO, 0 = none).
+    reflectance relative to its mean over features from 2 cm to 3 m. ``noise`` scales shot and read noise (1 = a small drone
+    camera at base ISO, 0 = none).
     """
 
     output: str

@@ -69,6 +69,9 @@ def test_folder_holds_what_a_survey_needs(made: tuple[Path, Result]) -> None:
     assert not [n for n in names if "fields" in n or ".part" in n or n.endswith(".lock")]
     assert not [p for p in folder.parent.iterdir() if p != folder]
     assert_allclose(result.gsd, 30.0 / 325.0)
+    page = (folder / "report" / "simulatesurvey.html").read_text()
+    # Green on dry sand: half a full well of 3839 DN above 256; sqrt(4500 + 16) electrons of noise at 2.344 a DN; 4 %.
+    assert re.search(r"green</td><td[^>]*>2176<.*?>28\.67<.*?>1\.49\d<.*?>76\.7\d<", page, re.DOTALL)
 
 
 def test_metadata_say_what_a_drone_says(made: tuple[Path, Result]) -> None:

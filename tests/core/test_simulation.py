@@ -397,6 +397,8 @@ def test_development_is_monotonic_from_black_to_white() -> None:
     assert (values[0], values[1], values[-1]) == (0, 0, 255)
     # (1000 - 256) / 3839 = 0.1938: 1.099 x 0.4778 - 0.099 of 255.
     assert values[3] == 109
+    assert_allclose(sensor.linear(np.array([0, 109, 255], np.uint8)), [0, 0.1938, 1], atol=0.002)
+    assert_allclose(sensor.linear(np.array([10], np.uint8)), 10 / 255 / 4.5)  # in the toe
 
 
 def test_targets_lie_apart_on_ground_that_can_hold_them() -> None:
