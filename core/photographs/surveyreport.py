@@ -41,8 +41,8 @@ def write_report(survey: Survey, notes: list[str], copy: Path | str | None) -> N
     )
     if any(is_raw(p.name) for p in photographs):
         report.text(
-            "RAW photographs are used as the sensor saw them, proportional to light. Width and height are those of the frame that "
-            "the camera gives its JPG: the one the file names, else that of its full preview, else all the sensor sees."
+            "RAW photographs are used as the sensor saw them, proportional to light. Width and height are those of the frame "
+            "that the camera gives its JPG: the one the file names, else that of its full preview, else all the sensor sees."
         )
     report.save(survey.report_path("createsurvey"), copy)
 
