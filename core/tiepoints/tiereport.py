@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..photographs.listing import some
 from ..photographs.reading import decode_pixels, mean_level, read_channel_sum
-from ..report.drawing import draw_coverage, draw_tie_points, side_by_side
+from ..report.drawing import WIDTH, draw_coverage, draw_tie_points, side_by_side
 from ..report.html import Report, new_figure
 from ..survey import Photograph, Survey
 from .features import read_features
@@ -308,7 +308,7 @@ def _draw_photograph(
     good = int(tied.sum())
     report.heading(f"{title}: {photograph.name}")
     report.picture(
-        side_by_side(*(draw_tie_points(ground, xy, tied, longer=_PICTURE) for ground in grounds)),
+        side_by_side(*(draw_tie_points(ground, xy, tied, longer=_PICTURE if enhanced else WIDTH) for ground in grounds)),
         f"Features that are matched in some pair (blue, {good}) and in none (orange, {len(tied) - good}), {where}.",
     )
     if detail:
