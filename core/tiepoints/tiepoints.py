@@ -26,6 +26,7 @@ from .matching import PairMatches
 from .pairs import Pair, blocks, choose_pairs, pairs_through_others
 from .refinement import Source, read_refined, refine_keypoints
 from .tiereport import write_report
+from .ties import count_ties, name_weak
 from .tracks import build_tracks, within_tracks
 
 CACHE = "cache"  # features and matches, so that what is done need not be done again; it may be deleted
@@ -105,15 +106,17 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         write_database(survey.folder / NAME, photographs, keypoints, pairs, before=lambda: survey.forget("tiepoints"))
         match_count = sum(len(p.matches) for p in pairs.values())
         groups = blocks(len(photographs), pairs)
-        if len(groups) > 1:
-            progress.warn(_apart(photographs, groups))
-        notes = [_apart(photographs, groups)] if len(groups) > 1 else []
+        ties = count_ties(photographs, found, pairs)
+        notes = [note for note in (_apart(photographs, groups), name_weak(photographs, ties)) if note]
+        for note in notes:
+            progress.warn(note)
         write_report(
             survey,
             photographs,
             [image.path for image in images] if enhanced else None,
             found,
             pairs,
+            ties,
             rule=rule,
             notes=notes,
             copy=request.output_html_file,
@@ -241,7 +244,9 @@ def _run_all(
 
 
 def _apart(photographs: Sequence[Photograph], groups: list[list[int]]) -> str:
-    """Return in one sentence which photographs are not tied to the rest."""
+    """Return in one sentence which photographs are not tied to the rest, nothing when all are in one block."""
+    if len(groups) == 1:
+        return ""
     names = "; ".join(some(photographs[i].name for i in group) for group in groups[1:6])
     return (
         f"The photographs fall into {len(groups)} blocks that share no tie points, of which only the largest "

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..photographs.listing import some
 from ..photographs.reading import decode_pixels, mean_level, read_channel_sum
 from ..report.drawing import WIDTH, draw_coverage, draw_tie_points, side_by_side
 from ..report.html import Report, new_figure
@@ -18,37 +16,17 @@ from ..survey import Photograph, Survey
 from .features import read_features
 from .matching import LEAST, LIMIT, PairMatches
 from .pairs import Pair
-from .statistics import CELLS, cell_counts
+from .statistics import CELLS
+from .ties import SCALES, Ties
 
 COVERAGES = 4  # photographs whose coverage is drawn
 
-_WEAK_MATCHES = 200  # fewer verified matches with its best partner than this, and a photograph is weakly tied
-_WEAK_COVERAGE = 30.0  # percent of the cells
 _PICTURE = 580  # pixels of the longer side of each of two pictures in a row
 _CROP = 380  # pixels of a detail at full resolution
 _LISTED = 30  # weakly tied photographs that are told of one by one
 _NAMED = 12  # of these that are named in the graph
-_SCALES = np.geomspace(0.5, 64.0, 57)  # pixels, edges of the histogram of scales
 _METRES = 111_200.0  # of a degree of latitude, near enough to draw
 _MATCHED, _OTHERS = "#0078ff", "#ff4800"
-
-
-@dataclass(frozen=True)
-class _Ties:
-    """What is told of each photograph (n of them): features, those matched, pairs, the best partner, matches by cell."""
-
-    features: NDArray[np.int64]
-    matched: NDArray[np.int64]
-    pairs: NDArray[np.int64]
-    best: NDArray[np.int64]  # matches with the best partner
-    partner: NDArray[np.int64]  # who that is, -1 for nobody
-    cells: NDArray[np.int64]  # (n, CELLS, CELLS) matched features
-    scales: NDArray[np.int64]  # (2, bins) of _SCALES, features in no pair and matched ones
-
-    @property
-    def coverage(self) -> NDArray[np.float64]:
-        """The percentage of cells with a matched feature (n,)."""
-        return 100.0 * np.count_nonzero(self.cells, axis=(1, 2)) / CELLS**2
 
 
 def write_report(
@@ -57,6 +35,7 @@ def write_report(
     enhanced: Sequence[Path] | None,
     features: Sequence[Path],
     pairs: Mapping[Pair, PairMatches],
+    ties: Ties,
     *,
     rule: str,
     notes: Sequence[str],
@@ -65,10 +44,8 @@ def write_report(
     """Write the report.
 
     ``enhanced`` are the images searched, None when they were the photographs themselves; ``features`` the files of
-    ``write_features``, which are read one at a time; ``rule`` tells how pairs were chosen.
+    ``write_features``; ``rule`` tells how pairs were chosen, ``notes`` are warnings.
     """
-    matched = _matched(len(photographs), pairs)
-    ties = _ties(photographs, features, pairs, matched)
     coverage = ties.coverage
     total = sum(len(pair.matches) for pair in pairs.values())
     report = Report(
@@ -78,9 +55,7 @@ def write_report(
     )
     for note in notes:
         report.warning(note)
-    weak = {i: why for i in range(len(photographs)) if (why := _weakness(ties, i))}
-    if weak:
-        report.warning(f"Weakly tied: {some(photographs[i].name for i in weak)}. Their orientation may be uncertain or fail.")
+    weak = ties.weak()
     report.text(
         f"{rule}. A match is verified when it agrees with one epipolar geometry (or homography) of its pair to "
         f"{LIMIT * 2000:.0f} pixels of a photograph 2000 pixels long; a pair needs {LEAST}. Coverage is the share of {CELLS} x "
@@ -93,12 +68,12 @@ def write_report(
     _draw_matrix(report, len(photographs), pairs)
     report.heading("Features")
     _draw_histograms(report, ties)
-    order = np.argsort(ties.matched, kind="stable")
+    order = np.argsort(ties.matches, kind="stable")
     chosen = {"barest": int(order[0]), "median": int(order[(len(order) - 1) // 2]), "richest": int(order[-1])}
     for rank, i in chosen.items():
         xy = read_features(features[i]).xy
         tied = np.zeros(len(xy), bool)
-        tied[matched[i]] = True
+        tied[ties.matched[i]] = True
         searched = enhanced[i] if enhanced else None
         _draw_photograph(report, f"The {rank} photograph", survey, photographs[i], searched, xy, tied, detail=rank == "median")
     report.heading("Photographs")
@@ -108,7 +83,7 @@ def write_report(
             (
                 p.name,
                 int(ties.features[i]),
-                int(ties.matched[i]),
+                int(ties.matches[i]),
                 int(ties.pairs[i]),
                 photographs[ties.partner[i]].name if ties.best[i] else None,
                 int(ties.best[i]),
@@ -120,61 +95,9 @@ def write_report(
     report.save(survey.report_path("tiepoints"), copy)
 
 
-def _matched(count: int, pairs: Mapping[Pair, PairMatches]) -> list[NDArray[np.int64]]:
-    """Return the indices of each photograph's features that are matched in some pair, each once."""
-    parts: list[list[NDArray[Any]]] = [[np.zeros(0, np.int64)] for _ in range(count)]
-    for (i, j), pair in pairs.items():
-        parts[i].append(pair.matches[:, 0])
-        parts[j].append(pair.matches[:, 1])
-    return [np.unique(np.concatenate(part)).astype(np.int64) for part in parts]
-
-
-def _ties(
-    photographs: Sequence[Photograph],
-    features: Sequence[Path],
-    pairs: Mapping[Pair, PairMatches],
-    matched: Sequence[NDArray[np.int64]],
-) -> _Ties:
-    count = len(photographs)
-    partners, best, partner = np.zeros(count, np.int64), np.zeros(count, np.int64), np.full(count, -1, np.int64)
-    for (i, j), pair in pairs.items():
-        for a, b in ((i, j), (j, i)):
-            partners[a] += 1
-            if len(pair.matches) > best[a]:
-                best[a], partner[a] = len(pair.matches), b
-    found = np.zeros(count, np.int64)
-    cells = np.zeros((count, CELLS, CELLS), np.int64)
-    scales = np.zeros((2, len(_SCALES) - 1), np.int64)
-    for i, (photograph, path) in enumerate(zip(photographs, features, strict=True)):
-        one = read_features(path)
-        found[i] = len(one)
-        cells[i] = cell_counts(one.xy[matched[i]], photograph.width, photograph.height)
-        tied = np.zeros(len(one), bool)
-        tied[matched[i]] = True
-        for k, chosen in enumerate((~tied, tied)):
-            scales[k] += np.histogram(np.clip(one.scale[chosen], _SCALES[0], _SCALES[-1]), bins=_SCALES)[0]
-    return _Ties(found, np.array([len(m) for m in matched]), partners, best, partner, cells, scales)
-
-
-def _weakness(ties: _Ties, i: int) -> str:
-    """Return why a photograph is weakly tied, nothing when it is not."""
-    if not ties.features[i]:
-        return "no features were found in it"
-    if not ties.pairs[i]:
-        return "it shares verified matches with no other"
-    why = []
-    if ties.best[i] < _WEAK_MATCHES:
-        why.append(f"{ties.best[i]} matches with its best partner (fewer than {_WEAK_MATCHES})")
-    if ties.coverage[i] < _WEAK_COVERAGE:
-        why.append(f"matches on {ties.coverage[i]:.0f} % of it (less than {_WEAK_COVERAGE:.0f} %)")
-    if ties.pairs[i] == 1 and len(ties.pairs) > 2:
-        why.append("tied to one other only")
-    return "; ".join(why)
-
-
-def _tell_weak(report: Report, survey: Survey, photographs: Sequence[Photograph], ties: _Ties, weak: Mapping[int, str]) -> None:
+def _tell_weak(report: Report, survey: Survey, photographs: Sequence[Photograph], ties: Ties, weak: Mapping[int, str]) -> None:
     """Say which photographs are weakly tied and why, and draw the coverage of the least covered ones."""
-    worst = np.lexsort((ties.matched, ties.coverage))
+    worst = np.lexsort((ties.matches, ties.coverage))
     if weak:
         listed = [int(i) for i in worst if int(i) in weak]
         report.table(["name", "why"], [(photographs[i].name, weak[i]) for i in listed[:_LISTED]])
@@ -204,7 +127,7 @@ def draw_coverages(
 
 
 def _draw_graph(
-    report: Report, photographs: Sequence[Photograph], pairs: Mapping[Pair, PairMatches], ties: _Ties, weak: Mapping[int, str]
+    report: Report, photographs: Sequence[Photograph], pairs: Mapping[Pair, PairMatches], ties: Ties, weak: Mapping[int, str]
 ) -> None:
     """Draw the pairs between the photographs' GNSS positions, when there are any."""
     from matplotlib.collections import LineCollection
@@ -234,7 +157,7 @@ def _draw_graph(
     axes.scatter(
         metres[:, 0], metres[:, 1], c=colours, s=22 if len(placed) < 200 else 7, edgecolors="white", linewidths=0.5, zorder=2
     )
-    for i in [i for i in np.argsort(ties.matched, kind="stable").tolist() if i in weak and i in placed][:_NAMED]:
+    for i in [i for i in np.argsort(ties.matches, kind="stable").tolist() if i in weak and i in placed][:_NAMED]:
         axes.annotate(Path(photographs[i].name).stem, place[i], fontsize=7, textcoords="offset points", xytext=(4, 4))
     axes.set(xlabel="to the east (m)", ylabel="to the north (m)", aspect="equal")
     axes.margins(0.06)
@@ -267,20 +190,20 @@ def _log_bar(figure: Any, mappable: Any, axes: Any, top: float) -> None:
     bar.set_ticks(ticks.tolist(), labels=[f"{10.0**t:.0f}" for t in ticks])
 
 
-def _draw_histograms(report: Report, ties: _Ties) -> None:
+def _draw_histograms(report: Report, ties: Ties) -> None:
     figure = new_figure(9.0, 3.2)
     left, right = figure.subplots(1, 2)
     edges = np.linspace(0, max(1, int(ties.features.max())), 31)
     left.hist(ties.features, bins=edges.tolist(), color="#bbbbbb", label="all")
-    left.hist(ties.matched, bins=edges.tolist(), color=_MATCHED, alpha=0.7, label="matched")
+    left.hist(ties.matches, bins=edges.tolist(), color=_MATCHED, alpha=0.7, label="matched")
     left.set(xlabel="features of a photograph", ylabel="photographs", xlim=(0, edges[-1]))
     left.yaxis.get_major_locator().set_params(integer=True)
     left.legend(fontsize=8)
     for counts, colour, name in zip(ties.scales, (_OTHERS, _MATCHED), ("in no pair", "matched"), strict=True):
-        right.stairs(counts, _SCALES, color=colour, linewidth=1.4, label=name)
+        right.stairs(counts, SCALES, color=colour, linewidth=1.4, label=name)
     full = np.flatnonzero(ties.scales.sum(axis=0))
     if len(full):
-        right.set_xlim(_SCALES[full[0]] / 1.1, _SCALES[full[-1] + 1] * 1.1)
+        right.set_xlim(SCALES[full[0]] / 1.1, SCALES[full[-1] + 1] * 1.1)
     right.set_xscale("log", base=2)
     right.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     right.set(xlabel="scale of a feature (sigma, px)", ylabel="features")

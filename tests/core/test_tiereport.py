@@ -10,6 +10,7 @@ from strandline.core.files import bytes_digest
 from strandline.core.survey import Photograph, Position, Survey
 from strandline.core.tiepoints.features import Features, write_features
 from strandline.core.tiepoints.tiereport import write_report
+from strandline.core.tiepoints.ties import count_ties, name_weak
 
 WIDTH, HEIGHT = 400, 300
 
@@ -47,9 +48,10 @@ def report(tmp_path):
             searched.append(path)
         survey = Survey.create(tmp_path / "survey", folder, None, photographs)
         found = {pair: Matches(np.repeat(np.arange(first, first + n)[:, None], 2, axis=1)) for pair, (first, n) in pairs.items()}
-        write_report(
-            survey, survey.photographs, searched if enhanced else None, features, found, rule="All", notes=["Apart."], copy=None
-        )
+        ties = count_ties(survey.photographs, features, found)
+        notes = ["Apart.", name_weak(survey.photographs, ties)]
+        images = searched if enhanced else None
+        write_report(survey, survey.photographs, images, features, found, ties, rule="All", notes=notes, copy=None)
         return survey.report_path("tiepoints").read_text(encoding="utf-8")
 
     return make
