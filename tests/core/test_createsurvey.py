@@ -149,6 +149,11 @@ def test_one_file_per_exposure(images, tmp_path):
     assert create(images, tmp_path, filter="*.jpg")[0].image_count == 4
     write(images / "sub" / "DJI_0002.png", kind="PNG")  # another folder, another exposure
     assert create(images, tmp_path, filter="*.[jp][pn]g")[0].image_count == 5
+    (images / "dji_0002.dng").unlink()
+    (images / "raw").mkdir()
+    (images / "raw" / "dji_0002.dng").write_bytes(b"raw")  # a folder for the other kind: the same exposure
+    with pytest.raises(InputError, match=r"1 exposures \(DJI_0002.JPG and raw/dji_0002.dng and sub/DJI_0002.png\).*FILTER"):
+        create(images, tmp_path)
 
 
 def test_filter(images, tmp_path):
