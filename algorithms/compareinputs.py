@@ -83,6 +83,7 @@ class CompareInputs(StepAlgorithm):
             tr("The survey of each case is kept there, and an interrupted comparison goes on. Empty: they go at the end."),
             optional=True,
         )
+        yield ask.threshold()
         yield ask.workers()
         yield ask.scheduler()
         yield ask.report(kept=False)

@@ -134,6 +134,15 @@ def survey() -> _Parameter:
     return folder("SURVEY", tr("Survey folder"), tr("The folder that 'Create survey' made. The step adds its files to it."))
 
 
+def threshold() -> _Parameter:
+    """Return what features must stand out of."""
+    text = tr(
+        "noise: features that stand out of each photograph's own noise; fixed: features above one contrast for all "
+        "photographs, as other programs take them, to compare with."
+    )
+    return advanced(choice("THRESHOLD", tr("Threshold"), text, ("noise", "fixed"), default="noise"))
+
+
 def workers() -> _Parameter:
     """Return the number of processes."""
     text = tr("How many processes work side by side; 0 is one per processor. Each takes memory: use fewer if it runs short.")

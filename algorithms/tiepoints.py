@@ -56,18 +56,7 @@ class TiePoints(StepAlgorithm):
             ("auto", "exhaustive", "sequential"),
             default="auto",
         )
-        yield ask.advanced(
-            ask.choice(
-                "THRESHOLD",
-                tr("Threshold"),
-                tr(
-                    "noise: features that stand out of each photograph's own noise; fixed: features above one contrast for all "
-                    "photographs, as other programs take them, to compare with."
-                ),
-                ("noise", "fixed"),
-                default="noise",
-            )
-        )
+        yield ask.threshold()
         yield ask.workers()
         yield ask.scheduler()
         yield ask.report()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -17,7 +17,7 @@ from ..orientation import georeference, orient
 from ..orientation.sparse import read_block
 from ..photographs import enhance
 from ..progress import Progress
-from ..survey import Survey
+from ..survey import Photograph, Survey
 from ..tiepoints import tiepoints
 from ..tiepoints.statistics import coverage_percent
 from ..vector import read_layer
@@ -32,6 +32,7 @@ class Settings:
     method: Literal["arctan", "micmac", "equalize"]
     window: int
     max_size: int
+    threshold: Literal["noise", "fixed"]
     camera_model: Literal["brown", "radial", "simple_radial", "full"]
     workers: int
     scheduler: str | None
@@ -41,19 +42,25 @@ class Settings:
 class Outcome:
     """What became of a case; what it did not reach is None, and ``note`` says why.
 
+    ``names`` are those of the photographs, in the order of the exposures, which is the same in all cases.
     ``coverage`` is the share (0..100) of 10 x 10 cells with a tie point that the adjustment kept, for every photograph by name,
     0 where it is not oriented. ``checks`` (dE, dN, dU; m) are the errors of the check points by name.
     """
 
     case: str
     survey: Path
-    images: int
+    names: Sequence[str]
     tied: tiepoints.Result | None = None
     oriented: orient.Result | None = None
     ground: georeference.Result | None = None
     coverage: Mapping[str, float] = field(default_factory=dict)
     checks: Mapping[str, Array] = field(default_factory=dict)
     note: str = ""
+
+    @property
+    def images(self) -> int:
+        """The number of photographs."""
+        return len(self.names)
 
     @property
     def mean_coverage(self) -> float | None:
@@ -64,6 +71,7 @@ class Outcome:
 def run_case(
     case: str,
     survey: Survey,
+    names: Sequence[str],
     enhanced: bool,
     settings: Settings,
     control: georeference.Request | None,
@@ -79,15 +87,22 @@ def run_case(
         When something cannot be used, which is no fault of the case.
     """
     told = progress.about(case)
+    by_name = {p.name: p for p in survey.photographs}
     where = str(survey.folder)
-    outcome = Outcome(case, survey.folder, len(survey.photographs))
+    outcome = Outcome(case, survey.folder, names)
     workers, scheduler = settings.workers, settings.scheduler
     method = settings.method if enhanced else "none"
     enhance.run(
         enhance.Request(where, method=method, window=settings.window, workers=workers, scheduler=scheduler), told.part(0.0, 0.2)
     )
     search = tiepoints.Request(
-        where, source="enhanced", max_features=0, max_size=settings.max_size, workers=workers, scheduler=scheduler
+        where,
+        source="enhanced",
+        max_features=0,
+        max_size=settings.max_size,
+        threshold=settings.threshold,
+        workers=workers,
+        scheduler=scheduler,
     )
     mapping = orient.Request(where, camera_model=settings.camera_model, workers=workers, scheduler=scheduler)
     try:
@@ -95,7 +110,7 @@ def run_case(
         outcome = replace(outcome, tied=tied)
         oriented = orient.run(mapping, told.part(0.7, 0.95))
         block = read_block(survey.folder / "model")
-        outcome = replace(outcome, oriented=oriented, coverage=_coverage(survey, block))
+        outcome = replace(outcome, oriented=oriented, coverage=_coverage([by_name[n] for n in names], block))
         if control is not None:
             residuals = survey.folder / "residuals.gpkg"
             request = replace(control, survey=where, residuals=str(residuals))
@@ -118,9 +133,9 @@ def places(block: Block) -> dict[str, Array]:
     }
 
 
-def _coverage(survey: Survey, block: Block) -> dict[str, float]:
+def _coverage(photographs: Sequence[Photograph], block: Block) -> dict[str, float]:
     seen = places(block)
-    return {p.name: coverage_percent(seen[p.name], p.width, p.height) if p.name in seen else 0.0 for p in survey.photographs}
+    return {p.name: coverage_percent(seen[p.name], p.width, p.height) if p.name in seen else 0.0 for p in photographs}
 
 
 def _checks(residuals: Path) -> dict[str, Array]:

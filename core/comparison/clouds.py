@@ -34,7 +34,7 @@ def case_clouds(outcomes: Sequence[Outcome], blocks: Mapping[str, Block]) -> tup
     centres = _centres(reference)
     looking = np.array([v.rotation[2] for v in reference.views])
     points, upright = levelled(reference.points, centres, looking)
-    order = {o.case: {p.name: i for i, p in enumerate(Survey.open(o.survey).photographs)} for o in outcomes}
+    order = {o.case: {name: i for i, name in enumerate(o.names)} for o in outcomes}
     exposure = {order[richest][v.name]: c for v, c in zip(reference.views, upright, strict=True)}
     clouds: dict[str, Cloud | None] = dict.fromkeys((o.case for o in outcomes), None)
     for case, block in blocks.items():

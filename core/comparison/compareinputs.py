@@ -32,7 +32,8 @@ CASES = (("JPG", False, False), ("RAW", True, False), ("CeJPG", False, True), ("
 
 @dataclass(frozen=True)
 class Request:
-    """Ground control as in ``georeference``; ``marks_raw`` are marks in the RAW, ``method`` is that of ``enhance``.
+    """Ground control as in ``georeference``; ``marks_raw`` are marks in the RAW. ``method`` is that of ``enhance``.
+
 
     ``surveys`` is a folder to keep the surveys of the cases in, and to go on from; ``table`` is a GeoPackage to write.
     """
@@ -61,6 +62,7 @@ class Request:
     method: Literal["arctan", "micmac", "equalize"] = "arctan"
     window: int = 101
     max_size: int = 0
+    threshold: Literal["noise", "fixed"] = "noise"
     camera_model: Literal["brown", "radial", "simple_radial", "full"] = "brown"
     surveys: str | None = None
     table: str | None = None
@@ -181,10 +183,8 @@ def _run_cases(
     _require_room(folder, exposures, len(cases))
     check_window(settings.method, settings.window, exposures.jpg.photographs)
     crs = survey_crs(request.crs, exposures.jpg.photographs)
-    surveys = {}
-    for name, is_raw, _ in cases:
-        source = exposures.raw if is_raw and exposures.raw else exposures.jpg
-        surveys[name] = write_survey(folder / f"survey-{name}", source, crs)
+    sources = {name: exposures.raw if is_raw and exposures.raw else exposures.jpg for name, is_raw, _ in cases}
+    surveys = {name: write_survey(folder / f"survey-{name}", source, crs) for name, source in sources.items()}
     controls = {False: control, True: control}
     if control is not None:
         check(control, surveys["JPG"])
@@ -193,8 +193,9 @@ def _run_cases(
             check(moved, surveys["RAW"])
     outcomes = []
     for i, (name, is_raw, enhanced) in enumerate(cases):
+        names = [p.name for p in sources[name].photographs]
         part = progress.part(i / len(cases), (i + 1) / len(cases))
-        outcomes.append(run_case(name, surveys[name], enhanced, settings, controls[is_raw], part))
+        outcomes.append(run_case(name, surveys[name], names, enhanced, settings, controls[is_raw], part))
         if not request.surveys:
             remove(surveys[name].folder / CACHE)
     return outcomes

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..photographs.enhance import enhanced_path
 from ..photographs.reading import decode_pixels
 from ..report.cloud import cloud_from_above, cloud_in_perspective, exaggeration
-from ..report.drawing import draw_coverage, draw_tie_points, side_by_side
+from ..report.drawing import Picture, draw_coverage, draw_tie_points, side_by_side
 from ..report.html import Report, new_figure
 from ..survey import Survey
 from ..tiepoints.statistics import CELLS, cell_counts
@@ -57,11 +57,12 @@ def write_report(
 
 def _how(outcomes: Sequence[Outcome], settings: Settings) -> str:
     size = f"reduced to {settings.max_size} pixels" if settings.max_size else "at full size"
+    above = "each photograph's own noise" if settings.threshold == "noise" else "one fixed contrast"
     window = f" in a window of {settings.window} pixels" if settings.method in ("arctan", "micmac") else ""
     return (
         f"{outcomes[0].images} exposures, the same in every case, with the same positions, marks and settings: features sought "
-        f"{size} without a limit on their number. Ce: contrast enhanced by {settings.method}{window}; the others are only "
-        "brought to 8 bits from the sum of their channels. Counts are those of MicMac (Rosu et al. 2015): MTP, tie points per "
+        f"{size} above {above}, without a limit on their number. Ce: contrast enhanced by {settings.method}{window}; the others "
+        "are only brought to 8 bits from the sum of their channels. Counts are those of MicMac (Rosu et al. 2015): MTP, tie points per "
         "oriented photograph that enter the final adjustment, and the share it keeps; MMTP, those in three or more photographs; "
         "MSE, the root mean square residual of the kept. The paper's numbers are of another beach, camera and detector: compare "
         "the ratios."
@@ -166,32 +167,36 @@ def _coverage(report: Report, outcomes: Sequence[Outcome]) -> None:
 
 def _photographs(report: Report, outcomes: Sequence[Outcome], seen: Mapping[str, Mapping[str, NDArray[np.float64]]]) -> None:
     """Draw the photograph that is covered least, and the one in which the cases differ most."""
-    surveys = [Survey.open(o.survey) for o in outcomes]
-    coverage = np.array([list(o.coverage.values()) for o in outcomes if o.oriented])
-    counts = np.array(
-        [[len(seen.get(o.case, {}).get(p.name, ())) for p in s.photographs] for o, s in zip(outcomes, surveys, strict=True)]
-    )
+    coverage = np.mean([list(o.coverage.values()) for o in outcomes if o.oriented], axis=0)
+    counts = np.array([[len(seen.get(o.case, {}).get(name, ())) for name in o.names] for o in outcomes])
     report.heading("Tie points on the photographs (figure 3 of the paper)")
-    least, apart = int(np.argmin(coverage.mean(axis=0))), int(np.argmax(np.ptp(counts, axis=0)))
-    chosen = {least: "covered least in all cases together", apart: "in which the cases differ most"}
-    if least == apart:
-        chosen = {least: "covered least, and the one in which the cases differ most"}
-    for index, why in chosen.items():
-        dots, cells, names = [], [], []
-        for o, survey in zip(outcomes, surveys, strict=True):
-            photograph = survey.photographs[index]
-            pixels = decode_pixels(enhanced_path(survey, photograph).read_bytes())
-            xy = seen.get(o.case, {}).get(photograph.name, np.zeros((0, 2)))
-            dots.append(draw_tie_points(pixels, xy, np.ones(len(xy), bool), longer=_PICTURE))
-            cells.append(draw_coverage(pixels, cell_counts(xy, photograph.width, photograph.height)))
-            names.append(f"{o.case} ({len(xy):,} tie points)" if o.oriented else f"{o.case} (not oriented)")
-        stem = Path(surveys[0].photographs[index].name).stem
+    least, apart = int(np.argmin(coverage)), int(np.argmax(np.ptp(counts, axis=0)))
+    for index in dict.fromkeys((least, apart)):
+        pictures = [_drawn(o, o.names[index], seen.get(o.case, {}).get(o.names[index])) for o in outcomes]
+        stem = Path(outcomes[0].names[index]).stem
+        why = "covered least in all cases together" if index == least else "in which the cases differ most"
         report.text(f"{stem} is the photograph {why}.")
         for i in range(0, len(outcomes), 2):
-            report.picture(side_by_side(*dots[i : i + 2]), f"{stem}: {' and '.join(names[i : i + 2])}, on the images searched.")
-        report.picture(
-            side_by_side(*cells), f"{stem} by cell, {', '.join(o.case for o in outcomes)}; red: none, yellow: 1,000 and more."
-        )
+            told = [f"{o.case} ({n:,} tie points)" for o, n in zip(outcomes[i : i + 2], counts[i : i + 2, index], strict=True)]
+            report.picture(
+                side_by_side(*(p[0] for p in pictures[i : i + 2])), f"{stem}: {' and '.join(told)}, on the images searched."
+            )
+        for i in range(0, len(outcomes) if index == least else 0, 2):
+            told = [o.case for o in outcomes[i : i + 2]]
+            report.picture(
+                side_by_side(*(p[1] for p in pictures[i : i + 2])),
+                f"{stem} by cell: {' and '.join(told)}; red: none, yellow: 1,000 and more.",
+            )
+
+
+def _drawn(outcome: Outcome, name: str, places: NDArray[np.float64] | None) -> tuple[Picture, Picture]:
+    """Return the image in which features were sought, with the tie points, and with their numbers by cell."""
+    survey = Survey.open(outcome.survey)
+    photograph = next(p for p in survey.photographs if p.name == name)
+    pixels = decode_pixels(enhanced_path(survey, photograph).read_bytes())
+    xy = np.zeros((0, 2)) if places is None else places
+    dots = draw_tie_points(pixels, xy, np.ones(len(xy), bool), longer=_PICTURE)
+    return dots, draw_coverage(pixels, cell_counts(xy, photograph.width, photograph.height))
 
 
 def _times(outcome: Outcome, jpg: Outcome, number: Callable[[Outcome], float | None]) -> str | float:

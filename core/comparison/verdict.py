@@ -121,12 +121,13 @@ def _best_covered(oriented: Sequence[Outcome]) -> str:
 def _smallest_errors(checked: Sequence[Outcome]) -> str:
     best = min(checked, key=lambda o: float(np.hypot(*rms(o.checks))))
     plan, height = rms(best.checks)
-    count = len(best.checks)
-    where = f"on {count} check point{'s' * (count != 1)} ({100 * plan:.1f} cm in plan, {100 * height:.1f} cm in height"
+    count = f"{len(best.checks)} check point{'s' * (len(best.checks) != 1)}"
+    size = f"{100 * plan:.1f} cm in plan, {100 * height:.1f} cm in height"
     alike = [o.case for o in checked if o is not best and differs(best.checks, o.checks) is None]
-    if alike:
-        where += f"; {listed(alike)} may differ from it by chance only"
-    return f"{best.case} has the smallest errors {where})"
+    if alike and len(alike) == len(checked) - 1:
+        return f"errors on {count} differ by no more than chance (smallest for {best.case}: {size})"
+    beside = f"; {listed(alike)} may differ from it by chance only" if alike else ""
+    return f"{best.case} has the smallest errors on {count} ({size}{beside})"
 
 
 def _worth(plain: Outcome, changed: Outcome) -> tuple[str, str]:
