@@ -36,8 +36,11 @@ def whole_raw(data: bytes) -> RawPhotograph:
     if raw.values.shape != again.values.shape or not np.array_equal(raw.values, again.values):
         raise ValueError("damaged, for it decodes to other pixels each time")
     distance = 1 if raw.pattern is None else len(raw.pattern)
-    # Sensors whose makers take the black off are 0 over and over where it is dark, but not along a whole row.
-    run = raw.values.shape[1] - distance if raw.black.min() == 0 else min(_RUN, raw.values.shape[1] - distance)
+    # Where the maker took the black off, what is dark is 0 over and over, and in pictures that were developed before they were
+    # written noise may be gone; but not along a whole row.
+    run = raw.values.shape[1] - distance
+    if raw.pattern is not None and raw.black.min() > 0:
+        run = min(run, _RUN)
     limit = _WILD * (raw.white - float(raw.black.mean()))
     for channel in np.atleast_3d(raw.values).transpose(2, 0, 1):
         if channel.min() == channel.max():

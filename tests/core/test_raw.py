@@ -361,6 +361,12 @@ def test_what_is_too_bright_or_too_dark_is_not_broken():
     assert whole_raw(dng(mosaic, white=4095)).values.shape == mosaic.shape
     mosaic[120:150, 5:290] = 0  # and one that takes the black off before it writes
     assert whole_raw(dng(mosaic, white=4095)).values.shape == mosaic.shape
+    smooth = np.dstack([noisy()] * 3)
+    smooth[40:80, :290] = 700  # developed, and its noise taken away
+    assert whole_raw(dng(smooth)).values.shape == smooth.shape
+    smooth[150:] = 0  # never written
+    with pytest.raises(ValueError, match="repeat themselves in row 150"):
+        whole_raw(dng(smooth))
 
 
 def test_a_file_that_decodes_to_other_pixels_each_time_is_found(monkeypatch):
