@@ -34,7 +34,6 @@ CASES = (("JPG", False, False), ("RAW", True, False), ("CeJPG", False, True), ("
 class Request:
     """Ground control as in ``georeference``; ``marks_raw`` are marks in the RAW. ``method`` is that of ``enhance``.
 
-
     ``surveys`` is a folder to keep the surveys of the cases in, and to go on from; ``table`` is a GeoPackage to write.
     """
 

@@ -61,11 +61,11 @@ def _how(outcomes: Sequence[Outcome], settings: Settings) -> str:
     window = f" in a window of {settings.window} pixels" if settings.method in ("arctan", "micmac") else ""
     return (
         f"{outcomes[0].images} exposures, the same in every case, with the same positions, marks and settings: features sought "
-        f"{size} above {above}, without a limit on their number. Ce: contrast enhanced by {settings.method}{window}; the others "
-        "are only brought to 8 bits from the sum of their channels. Counts are those of MicMac (Rosu et al. 2015): MTP, tie points per "
-        "oriented photograph that enter the final adjustment, and the share it keeps; MMTP, those in three or more photographs; "
-        "MSE, the root mean square residual of the kept. The paper's numbers are of another beach, camera and detector: compare "
-        "the ratios."
+        f"{size} above {above}, without a limit on their number. Ce: contrast enhanced by {settings.method}{window}; the "
+        "others are only brought to 8 bits from the sum of their channels. Counts are those of MicMac (Rosu et al. 2015): MTP, "
+        "tie points per oriented photograph that enter the final adjustment, and the share it keeps; MMTP, those in three or "
+        "more photographs; MSE, the root mean square residual of the kept. The paper's numbers are of another beach, camera and "
+        "detector: compare the ratios."
     )
 
 
