@@ -2,6 +2,7 @@
 
 import io
 import os
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import rawpy
 from PIL import ExifTags, Image
 from strandline.core.contract import encode
 from strandline.core.errors import InputError
-from strandline.core.photographs import createsurvey, wholeness
+from strandline.core.photographs import createsurvey, enhance, wholeness
 from strandline.core.photographs.containers import read_tags
 from strandline.core.photographs.enhancement import enhance_photograph
 from strandline.core.photographs.inspection import inspect
@@ -23,6 +24,7 @@ from strandline.core.photographs.reading import ChannelSum, gamma_coded, mean_le
 from strandline.core.photographs.wholeness import whole_raw
 from strandline.core.surface.pictures import read_grey, read_reduced
 from strandline.core.survey import Survey
+from strandline.core.tiepoints import tiepoints
 
 BYTE, ASCII, SHORT, LONG, RATIONAL, SRATIONAL = 1, 2, 3, 4, 5, 10
 SIZES = {BYTE: 1, ASCII: 1, SHORT: 2, LONG: 4, RATIONAL: 8, SRATIONAL: 8}
@@ -561,6 +563,27 @@ def test_enhanced_sand_does_not_move_with_the_pattern(shared_data):
     first, second = (enhance_photograph(total, "arctan", 51)[0].astype(int) for total in totals)
     assert np.abs(first[100 + dy : 500 + dy, 100 + dx : 700 + dx] - second[100:500, 100:700]).max() <= 1
     assert first[100:500, 100:700].std() > 40  # contrast there is
+
+
+@pytest.mark.parametrize("source", ["enhanced", "original"])
+def test_tie_points_of_raw(shared_data, tmp_path, source):
+    mosaic = decode_raw((shared_data / "raw" / SAMPLES[1]).read_bytes()).values
+    (tmp_path / "images").mkdir()
+    for name, pattern, part in (("a", "RGGB", mosaic[:480, :640]), ("b", "BGGR", mosaic[41:521, 25:665])):
+        (tmp_path / "images" / f"{name}.dng").write_bytes(dng(part, pattern=pattern, black=(512,), white=16383))
+    survey = str(tmp_path / "survey")
+    createsurvey.run(createsurvey.Request(str(tmp_path / "images"), survey))
+    if source == "enhanced":
+        enhance.run(enhance.Request(survey, window=51, workers=1))
+    result = tiepoints.run(tiepoints.Request(survey, source=source, max_features=2000, workers=1))
+    assert (result.pair_count, result.match_count > 400) == (1, True)
+    with sqlite3.connect(tmp_path / "survey" / "features.db") as database:
+        tables = database.execute("select rows, cols, data from keypoints order by image_id").fetchall()
+        rows, columns, data = database.execute("select rows, cols, data from two_view_geometries").fetchone()
+    first, second = (np.frombuffer(d, np.float32).reshape(r, c)[:, :2] for r, c, d in tables)
+    pairs = np.frombuffer(data, np.uint32).reshape(rows, columns)
+    shift = first[pairs[:, 0]] - second[pairs[:, 1]]
+    assert np.median(shift, axis=0) == pytest.approx([25, 41], abs=0.02)  # the pixels are the same
 
 
 def test_libraw_uses_one_thread_and_the_environment_stays(shared_data):
