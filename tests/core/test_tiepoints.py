@@ -14,6 +14,7 @@ import pycolmap
 import pytest
 from strandline.core.errors import InputError, NotEnoughData
 from strandline.core.orientation import orient
+from strandline.core.orientation.mapping import read_network
 from strandline.core.orientation.sparse import read_block
 from strandline.core.photographs import createsurvey, enhance
 from strandline.core.progress import Progress, Silent
@@ -157,12 +158,13 @@ def test_two_workers_give_the_same(sand, tmp_path):
 def test_a_killed_run_goes_on_where_it_was(sand, tmp_path):
     survey = make(tmp_path, SAND)
     code = f"from strandline.core.tiepoints import tiepoints as t;t.run(t.Request({str(survey)!r}, max_features=4000, workers=1))"
-    process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
-    while process.poll() is None and len(list((survey / "cache" / "features").glob("*.npz"))) < 2:
-        time.sleep(0.01)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    assert Survey.open(survey).record("tiepoints") is None
+    for folder, files in (("features", 2), ("refined", 5)):  # four files of patches come before those of refined keypoints
+        process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
+        while process.poll() is None and len(list((survey / "cache" / folder).glob("[!.]*.npz"))) < files:
+            time.sleep(0.01)
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        assert Survey.open(survey).record("tiepoints") is None
     (survey / "cache" / "features" / ".part-1-x.npz").write_bytes(b"half")
     listener = Listener()
     result = tie(survey, listener)
@@ -170,6 +172,10 @@ def test_a_killed_run_goes_on_where_it_was(sand, tmp_path):
     assert result.match_count == sand[2].match_count
     assert Survey.open(survey).record("tiepoints").fingerprint == Survey.open(sand[1]).record("tiepoints").fingerprint
     assert not list((survey / "cache").glob("*/.part*"))
+    expected, found = read_network(sand[1] / "features.db"), read_network(survey / "features.db")
+    assert all(np.array_equal(expected.xy[i], found.xy[i]) for i in expected.names)
+    assert all(np.array_equal(expected.matches[pair], found.matches[pair]) for pair in expected.matches)
+    assert len(list((survey / "cache" / "refined").glob("*"))) == 4
 
 
 def test_blocks_apart_are_named(tmp_path):
