@@ -31,10 +31,11 @@ class Enhance(StepAlgorithm):
             "METHOD",
             tr("Method"),
             tr(
-                "arctan: each pixel against the mean and deviation of its window, through an arc tangent (the best on sand); "
-                "micmac: MicMac's variant; equalize: the image's whole histogram; none: only reduced to 8 bits."
+                "arctan: each pixel against the mean and deviation of its window, through an arc tangent; micmac: MicMac's variant; "
+                "equalize: the image's whole histogram; none: only reduced to 8 bits; bandpass: as arctan, of an image from which "
+                "the finest noise has been taken, which gives more tie points on sand."
             ),
-            ("arctan", "micmac", "equalize", "none"),
+            ("arctan", "micmac", "equalize", "none", "bandpass"),
             default="arctan",
         )
         yield ask.integer(

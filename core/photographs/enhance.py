@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import shapely
@@ -32,7 +31,7 @@ class Request:
     """``window`` is the side of the square window in pixels, odd."""
 
     survey: str
-    method: Literal["arctan", "micmac", "equalize", "none"] = "arctan"
+    method: Method = "arctan"
     window: int = 101
     ignore: VectorSource | None = None
     workers: int = 0

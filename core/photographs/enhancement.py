@@ -5,6 +5,11 @@ by the mean and the standard deviation of the square window around it and compre
 by one fixed affine function, so that the same ground looks the same in two photographs.
 The ``micmac`` method is what MicMac's "SFS" does: a global tone curve that the local term may shift by at most 64.
 
+The ``bandpass`` method takes the noise off first, by a narrow Gaussian, and then goes on as arctan: local contrast normalisation
+(Jarrett, Kavukcuoglu, Ranzato and LeCun 2009) of a band of scales. On sand a single pixel is mostly noise. The
+arctangent folds that into the signal for good, and the standard deviation it divides by is that of the noise; once it is
+taken off, what is left of the texture fills the range.
+
 Where pixels are masked, sums over the window become sums over its unmasked pixels (normalised convolution), and where those are
 less than a quarter of the window nothing is defined.
 """
@@ -22,9 +27,12 @@ from numpy.typing import NDArray
 
 from .reading import ChannelSum, mean_level
 
-Method = Literal["arctan", "micmac", "equalize", "none"]
+Method = Literal["arctan", "micmac", "equalize", "none", "bandpass"]
 _BINS = 65536  # of MicMac's histograms
 _MARGIN = 64.0  # grey levels by which MicMac's local term may shift the tone
+_LOW_PASS = 1.0  # sigma in pixels of the Gaussian before "bandpass"
+_REACH = 4  # pixels after which it is cut
+_FINEST = 1 << 22  # what is low-passed is held in whole numbers up to about this
 _EVERY = 16  # the statistics are taken from every 16th row
 _LEAST_SHARE = 0.25  # of a window's pixels that must be unmasked
 _UNDEFINED = 128  # grey level of masked and undefined pixels: flat, so that nothing is found there
@@ -63,7 +71,7 @@ def noise_floor(channels: int, step: float = 1.0) -> float:
 
 def has_window(method: Method) -> bool:
     """Tell whether a method looks at a window around each pixel."""
-    return method in ("arctan", "micmac")
+    return method in ("arctan", "micmac", "bandpass")
 
 
 def enhance_photograph(
@@ -79,6 +87,7 @@ def enhance_photograph(
         ``arctan``: ``127.5 + 127.5 * local``, rounded, with ``local = atan((x - mean) / max(sigma, floor)) / (pi / 2)``
         over the window, reflected at the border with the edge pixel repeated.
         ``micmac``: ``tone + margin * local``, truncated, with the edge pixel replicated; see ``micmac_tables``.
+        ``bandpass``: as ``arctan``, of ``low_passed`` values, and with the floor that is left of the noise by that.
         ``equalize``: 255 times the inclusive share of pixels that are not brighter, rounded. (A gamma curve before
         it would change nothing.)
         ``none``: the mean of the channels at 8 bits. JPG, TIFF and PNG are gamma-coded already: no curve is applied.
@@ -99,9 +108,14 @@ def enhance_photograph(
     if not has_window(method):
         grey = mean_level(photograph) if method == "none" else equalized_table(values, valid)[values]
         return _flat(grey, kept), Contrast(noise, levels, masked_percent=masked)
+    unit = step  # one DN in the values whose contrast is taken
+    floor = noise_floor(photograph.channels, step)
+    if method == "bandpass":
+        values, scale, gain = low_passed(values, photograph.white, valid)
+        unit, floor = scale * step, floor * scale * gain
     half = window // 2
     counts = _NO_COUNTS if valid is None else _window_counts(valid, method, window)
-    present = values if valid is None else np.where(valid, values, values.dtype.type(0))  # adds nothing to the sums
+    present = values if valid is None else np.where(valid, values, np.zeros((), values.dtype))  # adds nothing to the sums
     if method == "micmac":
         tone, margin = micmac_tables(values, valid)
         rows, columns = (np.clip(np.arange(-half, n + half), 0, n - 1) for n in values.shape)
@@ -110,12 +124,11 @@ def enhance_photograph(
         tone, margin = np.full(1, 128.0, np.float32), np.full(1, 127.5, np.float32)
         rows, columns = (reflected(n, half) for n in values.shape)
     out = np.empty(values.shape, np.uint8)
-    floor = noise_floor(photograph.channels, step)
     sigma, below, count = _local_contrast(
         present, counts, _NO_PIXELS if kept is None else kept, rows, columns, floor, tone, margin, out
     )
-    mean_sigma, below_percent = (sigma / count / step, 100.0 * below / count) if count else (None, None)
-    return _flat(out, kept), Contrast(noise, levels, mean_sigma, floor / step, below_percent, masked)
+    mean_sigma, below_percent = (sigma / count / unit, 100.0 * below / count) if count else (None, None)
+    return _flat(out, kept), Contrast(noise, levels, mean_sigma, floor / unit, below_percent, masked)
 
 
 def usable(valid: NDArray[np.bool_], method: Method, window: int) -> NDArray[np.bool_]:
@@ -123,6 +136,29 @@ def usable(valid: NDArray[np.bool_], method: Method, window: int) -> NDArray[np.
     if not has_window(method):
         return valid
     return np.asarray(valid & (_window_counts(valid, method, window) >= _LEAST_SHARE * window * window))
+
+
+def low_passed(
+    values: NDArray[Any], white: int, valid: NDArray[np.bool_] | None = None
+) -> tuple[NDArray[np.uint32], float, float]:
+    """Return a Gaussian mean of values (rows, columns) in whole numbers, the number of those in one, and the gain on white noise.
+
+    Masked pixels do not enter it; where there are only those it is 0. The border is reflected.
+    """
+    kernel = cv2.getGaussianKernel(2 * _REACH + 1, _LOW_PASS, cv2.CV_32F)
+    scale = 2.0 ** math.floor(math.log2(_FINEST / white))
+
+    def mean(image: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.asarray(cv2.sepFilter2D(image, cv2.CV_32F, kernel, kernel, borderType=cv2.BORDER_REFLECT), np.float32)
+
+    if valid is None:
+        smooth = mean(values.astype(np.float32))
+    else:
+        share = mean(valid.astype(np.float32))
+        smooth = mean(np.where(valid, values, 0).astype(np.float32)) / np.maximum(share, np.float32(1e-6))
+    smooth *= np.float32(scale)
+    smooth += np.float32(0.5)
+    return smooth.astype(np.uint32), scale, float((kernel.astype(float) ** 2).sum())
 
 
 def reflected(count: int, half: int) -> NDArray[np.int64]:

@@ -8,6 +8,7 @@ import pytest
 from strandline.core.photographs.enhancement import (
     enhance_photograph,
     equalized_table,
+    low_passed,
     micmac_tables,
     noise_floor,
     pixel_noise,
@@ -100,6 +101,48 @@ def test_arctan_against_brute_force(bits, channels, window, masked):
             assert (~defined).sum() > (~valid).sum()
 
 
+def gaussian_mean(values, valid=None):
+    """A Gaussian mean of sigma 1 px over 9 x 9 pixels, each summed on its own, of valid pixels."""
+    weights = np.exp(-(np.arange(-4, 5) ** 2) / 2.0)
+    weights = np.outer(weights, weights)
+    padded = np.pad(values.astype(float), 4, mode="symmetric")
+    there = np.pad(np.ones(values.shape) if valid is None else valid, 4, mode="symmetric")
+    out = np.zeros(values.shape)
+    for r in range(values.shape[0]):
+        for c in range(values.shape[1]):
+            w = weights * there[r : r + 9, c : c + 9]
+            out[r, c] = (w * padded[r : r + 9, c : c + 9]).sum() / max(w.sum(), 1e-300)
+    return out
+
+
+@pytest.mark.parametrize("masked", [False, True])
+@pytest.mark.parametrize(("bits", "window"), [(8, 11), (12, 25), (16, 37)])
+def test_bandpass_against_brute_force(bits, window, masked):
+    total = channel_sum(sand(bits))
+    valid = a_mask(total.values.shape) if masked else None
+    smooth = gaussian_mean(total.values, valid)
+    # Of white noise is left the root of the sum of squared weights, 0.2821: 1 / (2 sqrt(pi)).
+    floor = math.sqrt(3) * 0.28210
+    local = reference(smooth, window, floor, "symmetric", valid)
+    out, contrast = enhance_photograph(total, "bandpass", window, valid)
+    defined = ~np.isnan(local)
+    # A level of 16 bits is held in sixteen parts, and rounded: at the floor of 0.5 that is a few levels in a hundred.
+    assert np.abs(out - (127.5 + 127.5 * local))[defined].max() < 1.0
+    assert (out[~defined] == 128).all()
+    assert contrast.floor == pytest.approx(floor, rel=1e-3)
+
+
+def test_low_pass_by_hand():
+    # One 1000 among zeros: at its place the Gaussian's largest weight, (1 / sum of exp(-k^2 / 2))^2 = (1 / 2.50661)^2 = 0.159157.
+    values = np.zeros((31, 31), np.uint16)
+    values[15, 15] = 1000
+    smooth, scale, gain = low_passed(values, 765)
+    assert smooth[15, 15] / scale == pytest.approx(159.157, abs=0.01)
+    assert smooth.sum() / scale == pytest.approx(1000.0, abs=0.1)
+    assert gain == pytest.approx(0.2821, abs=1e-4)  # 1 / (2 sqrt(pi))
+    assert (low_passed(np.full((20, 20), 765, np.uint16), 765)[0] == 765 * scale).all()
+
+
 def micmac_reference(values, window, floor, valid=None):
     """What MicMac's formula gives, unrounded, with 65,536 bins from 0 to the largest value."""
     chosen = values[valid] if valid is not None else values.ravel()
@@ -149,7 +192,7 @@ def test_masked_pixels_enter_nothing():
     # What stands under the mask makes no difference, by any method.
     pixels, valid = sand(12), a_mask((37, 45))
     others = np.where(valid[:, :, None], pixels, np.uint16(4095))
-    for method in ("arctan", "micmac", "equalize", "none"):
+    for method in ("arctan", "micmac", "equalize", "none", "bandpass"):
         results = [enhance_photograph(channel_sum(p), method, 11, valid) for p in (pixels, others)]
         assert (results[0][0] == results[1][0]).all()
         assert results[0][1] == results[1][1]
@@ -178,7 +221,7 @@ def test_a_quarter_of_the_window_must_be_left():
 
 
 def test_all_masked():
-    for method in ("arctan", "micmac", "equalize", "none"):
+    for method in ("arctan", "micmac", "equalize", "none", "bandpass"):
         out, contrast = enhance_photograph(channel_sum(sand(8)), method, 11, np.zeros((37, 45), bool))
         assert (out == 128).all()
         assert (contrast.masked_percent, contrast.noise, contrast.mean_sigma) == (100.0, 0.0, None)
