@@ -23,13 +23,15 @@ from .guided import guided_matches
 
 Array = NDArray[np.float64]
 
-VERSION = 2  # part of the key under which matches are kept
+VERSION = 3  # part of the key under which matches are kept
 LIMIT = 4.0 / 2000.0  # a verified match is this near its epipolar line (or homography), as a share of the longer side
 LEAST = 15  # verified matches below which a pair is not one
 _COARSE = 3000
 _COARSE_RATIO = 0.85
 _RATIO = 0.85
 _PRODUCT = 0.80
+_SOME = 2000  # matches from which a pair's geometry is found
+_SHARE = 0.5  # of guided matches that agree with one geometry: nearly all where there is one, a fifth to a quarter by chance
 _EQUAL = 512.0**2  # product of equal descriptors
 _NONE = np.zeros((0, 2), np.int32)
 
@@ -113,7 +115,9 @@ def _match_all(
     # One place seen under two orientations is one match.
     places = np.concatenate([first.xy[guided[:, 0]], second.xy[guided[:, 1]]], axis=1)
     _, unique = np.unique(np.rint(places), axis=0, return_index=True)
-    return verify(first, second, cameras, guided[np.sort(unique)])
+    found = guided[np.sort(unique)]
+    verified = verify(first, second, cameras, found)
+    return verified if len(verified.matches) >= _SHARE * len(found) else PairMatches.none()
 
 
 def coarse(features: Features, camera: Camera) -> NDArray[np.intp]:
@@ -134,30 +138,53 @@ def mutual_matches(first: NDArray[np.uint8], second: NDArray[np.uint8], *, ratio
 
 
 def verify(first: Features, second: Features, cameras: tuple[Camera, Camera], matches: NDArray[np.int32]) -> PairMatches:
-    """Return the matches that agree with one two-view geometry, found by RANSAC with a fixed seed."""
+    """Return the matches that agree with one two-view geometry, found by RANSAC with a fixed seed.
+
+    The geometry is that of a few thousand matches spread over the photograph: more take longer and tell no more.
+    """
     if len(matches) < LEAST:
         return PairMatches.none()
+    limit = LIMIT * max(*(max(c.width, c.height) for c in cameras))
+    xy = [f.xy[k].astype(np.float64) for f, k in zip((first, second), matches.T, strict=True)]
+    likeness = _likeness(first, second, matches)
+    some = spread(first.xy[matches[:, 0]], likeness, (cameras[0].width, cameras[0].height), _SOME)
     options = pycolmap.TwoViewGeometryOptions()
     options.min_num_inliers = LEAST
     options.detect_watermark = False
-    options.ransac.max_error = LIMIT * max(*(max(c.width, c.height) for c in cameras))
+    options.ransac.max_error = limit
     options.ransac.random_seed = 1
     given = [pycolmap.Camera(model=c.model, width=c.width, height=c.height, params=list(c.params)) for c in cameras]
     for camera in given:
         camera.has_prior_focal_length = False  # an uncertain focal length must not reject matches
-    found = pycolmap.estimate_two_view_geometry(
-        given[0], first.xy.astype(float), given[1], second.xy.astype(float), matches.astype(np.uint32), options
-    )
-    kept = np.asarray(found.inlier_matches, np.int32).reshape(-1, 2)
-    if len(kept) < LEAST:
+    index = np.column_stack([np.arange(len(some), dtype=np.uint32)] * 2)
+    found = pycolmap.estimate_two_view_geometry(given[0], xy[0][some], given[1], xy[1][some], index, options)
+    essential, fundamental, plane = (np.zeros((3, 3)) if m is None else np.array(m, float) for m in (found.E, found.F, found.H))
+    good = _agree(*xy, fundamental, plane, limit)
+    if min(good.sum(), len(found.inlier_matches)) < LEAST:
         return PairMatches.none()
-    essential, fundamental = (np.zeros((3, 3)) if m is None else np.array(m, float) for m in (found.E, found.F))
-    plane, _ = cv2.findHomography(first.xy[kept[:, 0]], second.xy[kept[:, 1]], 0)
+    fitted, _ = cv2.findHomography(xy[0][good], xy[1][good], 0)
     # A homography that sends the photograph's corner to infinity cannot predict anything.
-    usable = plane is not None and abs(plane[2, 2]) > 1e-9
-    homography = plane / plane[2, 2] if usable else np.zeros((3, 3))
-    likeness = np.einsum("nk,nk->n", *(f.descriptors[k].astype(np.float32) for f, k in zip((first, second), kept.T, strict=True)))
-    return PairMatches(kept, int(found.config), essential, fundamental, homography, likeness / np.float32(_EQUAL))
+    usable = fitted is not None and abs(fitted[2, 2]) > 1e-9
+    homography = fitted / fitted[2, 2] if usable else np.zeros((3, 3))
+    return PairMatches(matches[good], int(found.config), essential, fundamental, homography, likeness[good])
+
+
+def _agree(first: Array, second: Array, fundamental: Array, plane: Array, limit: float) -> NDArray[np.bool_]:
+    """Tell which points (n, 2) agree with the fundamental matrix (Sampson's distance), or with the homography if more do."""
+    one, two = (np.column_stack([xy, np.ones(len(xy))]) for xy in (first, second))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        line2, line1 = one @ fundamental.T, two @ fundamental
+        product = np.einsum("nk,nk->n", two, line2)
+        epipolar = product**2 / (line1[:, :2] ** 2 + line2[:, :2] ** 2).sum(axis=1) <= limit**2
+        mapped = one @ plane.T
+        planar = np.hypot(*(mapped[:, :2] / mapped[:, 2:] - second).T) <= limit
+    return planar if planar.sum() > epipolar.sum() else epipolar
+
+
+def _likeness(first: Features, second: Features, matches: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Return the product of the descriptors of each match, 1 for equal ones."""
+    one, two = (f.descriptors[k].astype(np.float32) for f, k in zip((first, second), matches.T, strict=True))
+    return np.einsum("nk,nk->n", one, two) / np.float32(_EQUAL)
 
 
 def write_matches(path: Path, pair: PairMatches) -> None:
