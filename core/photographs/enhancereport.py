@@ -42,6 +42,7 @@ def write_report(
         report.text(
             "Noise floor: a standard deviation in the window below the square root of the number of channels (1 DN in each) is "
             "taken as that. A pixel's noise includes the finest texture."
+            + (" Here both are of the image after the noise of single pixels was taken off." if method == "bandpass" else "")
         )
     if notes:
         report.heading("Areas to ignore")
@@ -74,7 +75,8 @@ def _verdict(photographs: list[Photograph], contrasts: dict[str, Contrast], meth
     below = np.mean([b for p in photographs if (b := contrasts[p.name].below_percent) is not None])
     return (
         f"{len(photographs)} images by the method '{method}' with a window of {window} pixels: the contrast in the window is "
-        f"{np.median(sigmas):.1f} DN against {noise:.1f} DN of pixel noise; {below:.1f} % of the pixels lie below the floor."
+        f"{np.median(sigmas):.1f} DN against {noise:.1f} DN of noise of a pixel in the photographs; {below:.1f} % of the pixels "
+        "lie below the noise floor."
     )
 
 
