@@ -24,11 +24,11 @@ from .scalespace import LAYERS, Octave, differences, extrema, finer_octave, gaus
 
 Threshold = Literal["noise", "fixed"]
 
-VERSION = 2  # part of the key under which features are kept: raise it when the same image would give others
-_TIMES_NOISE = 3.0  # white noise gives fewer than 100 features per megapixel above it, and half of all without it
+VERSION = 3  # part of the key under which features are kept: raise it when the same image would give others
+_TIMES_NOISE = 3.0  # independent noise of any level leaves some 200 features per megapixel above it, of 4,500
 _FAINTEST = 0.02  # grey levels: less than three times what the least noise leaves at the coarsest scale of an octave
 _FIXED = 0.01 * 255 / LAYERS  # grey levels: the contrast 0.01 as OpenCV counts it
-_CELLS = 32  # cells along the longer side among which the features are shared out
+_CELLS = 16  # along the longer side, among which features are shared out: more cells cost matches and cover no more ground
 _LEAST = 16  # pixels of the shorter side of the smallest image that is searched
 _FOUND = np.dtype([("xy", np.float32, 2), ("scale", np.float32), ("score", np.float32), ("pixel", np.float32)])
 
@@ -97,7 +97,7 @@ def detect(
         found = np.concatenate([_search(finer_octave(small), noise, free, threshold), found])
     if max_features:
         width, height = small.shape[::-1]
-        found = found[spread(found["xy"], found["score"], (width, height), max_features)]
+        found = found[spread(found["xy"], found["score"], (width, height), max_features, cells=_CELLS)]
     angle = np.empty(len(found), np.float32)
     descriptors = np.empty((len(found), 128), np.uint8)
     for octave in chain([finer_octave(small)] if finer else [], octaves(small)):
@@ -106,16 +106,19 @@ def detect(
     return Features(found["xy"] * factor, found["scale"] * factor.mean(), angle, descriptors)
 
 
-def spread(xy: NDArray[np.float32], score: NDArray[np.float32], size: tuple[int, int], count: int) -> NDArray[np.intp]:
+def spread(
+    xy: NDArray[np.float32], score: NDArray[np.float32], size: tuple[int, int], count: int, *, cells: int = 32
+) -> NDArray[np.intp]:
     """Return the indices (ascending) of ``count`` points (n, 2) such that every grid cell gives its best in turn.
 
-    ``size`` is width, height. A cell with fewer points than its share leaves the rest to the others.
+    ``size`` is width, height; there are ``cells`` along the longer. A cell with fewer points than its share leaves the rest to
+    the others.
     """
     if len(xy) <= count:
         return np.arange(len(xy))
-    cell = max(size) / _CELLS
+    cell = max(size) / cells
     column, row = (xy // cell).astype(np.int64).T
-    index = row * (_CELLS + 1) + column
+    index = row * (cells + 1) + column
     order = np.lexsort((-score, index))
     starts = np.flatnonzero(np.diff(index[order], prepend=-1))
     rank = np.empty(len(xy), np.int64)
@@ -184,9 +187,9 @@ def _search(octave: Octave, noise: NoiseMap, free: NDArray[np.float32] | None, t
             part = part[free[y, x] > SUPPORT * part["scale"]]
         parts.append(part)
     found = np.concatenate(parts)
-    # Two searches may end at one place, with the same numbers.
-    _, first = np.unique(np.ascontiguousarray(found["xy"]).view(np.uint64), return_index=True)
-    return found[np.sort(first)]
+    # Two searches may end at one place, with the same numbers. As whole numbers, pairs of coordinates sort by rows.
+    _, first = np.unique(np.ascontiguousarray(found["xy"]).view("<u8"), return_index=True)
+    return found[first]
 
 
 def _described(octave: Octave, found: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:

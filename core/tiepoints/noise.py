@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .scalespace import INPUT_BLUR, LAYERS
+from .scalespace import LAYERS
 
 _HALF = 16  # half a window of the local mean, in pairs of pixels
 _ROUNDING = 1.0 / math.sqrt(12.0)  # grey levels: the noise of rounding to whole ones, below which nothing is believed
@@ -46,9 +46,8 @@ def noise_map(image: NDArray[np.uint8]) -> NoiseMap:
 def noise_gain(sigma: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the standard deviation of the difference of Gaussians of unit white noise, the finer of ``sigma`` pixels.
 
-    The noise enters after the blur that the image has by itself. For variances a, b of two Gaussians
-    the integral of their product is 1 / (2 pi (a + b)).
+    For variances a, b of two Gaussians the integral of their product is 1 / (2 pi (a + b)).
     """
-    a = np.maximum(np.asarray(sigma, np.float64) ** 2 - INPUT_BLUR**2, 0.01)
-    b = np.asarray(sigma, np.float64) ** 2 * 2.0 ** (2.0 / LAYERS) - INPUT_BLUR**2
+    a = np.asarray(sigma, np.float64) ** 2
+    b = a * 2.0 ** (2.0 / LAYERS)
     return np.asarray(np.sqrt((1 / a + 1 / b - 4 / (a + b)) / (4 * math.pi)), np.float32)

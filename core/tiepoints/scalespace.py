@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 Image = NDArray[np.float32]
 
 LAYERS = 3  # scales per octave
-SIGMA = 1.6  # blur of an octave's first layer, in its pixels
-INPUT_BLUR = 0.5  # sigma of the blur a photograph has by itself, in its pixels
+SIGMA = 1.6  # blur of an octave's first layer, in its pixels; what blur the photograph has itself is not counted
 BORDER = 5  # pixels at the edge of an octave that hold no extremum
 _TRUNCATE = 4.0  # sigmas after which a Gaussian is cut
 _STRIP = 1 << 21  # pixels of a strip, without its overlap
 _OVERLAP = 64  # rows: the blurs of all layers reach 43; those below a descriptor 20, and it 39
 _LEAST = 16  # pixels of the shorter side of the last octave
+_NEAR = 0.75  # pixels and layers from the pixel it was found at; above a half, or rounding loses extrema between two pixels
 _STEPS = 5  # of the search for an extremum between the pixels
 _EDGE = 10.0  # ratio of the principal curvatures above which an extremum is an edge
 
@@ -61,7 +61,7 @@ class Strip:
 def octaves(image: NDArray[np.uint8]) -> Iterator[Octave]:
     """Yield the octaves of an image from its own pixels on, each of half the rows and columns of the one before."""
     pixel = 1.0
-    base = _blurred(image.astype(np.float32), math.sqrt(SIGMA**2 - INPUT_BLUR**2))
+    base = _blurred(image.astype(np.float32), SIGMA)
     while min(base.shape) >= _LEAST:
         octave = Octave(pixel, base.shape, lambda first, last, base=base: base[first:last])  # type: ignore[misc]
         yield octave
@@ -72,8 +72,7 @@ def octaves(image: NDArray[np.uint8]) -> Iterator[Octave]:
 def finer_octave(image: NDArray[np.uint8]) -> Octave:
     """Return the octave of twice the rows and columns, made by linear interpolation."""
     height, width = image.shape
-    sigma = math.sqrt(SIGMA**2 - (2 * INPUT_BLUR) ** 2)
-    reach = 2 * math.ceil(_TRUNCATE * sigma)  # even, so that a part starts on a pixel of the image
+    reach = 2 * math.ceil(_TRUNCATE * SIGMA)  # even, so that a part starts on a pixel of the image
 
     def rows(first: int, last: int) -> Image:
         top, bottom = max(0, first - first % 2 - reach), min(2 * height, last + reach)
@@ -87,7 +86,7 @@ def finer_octave(image: NDArray[np.uint8]) -> Octave:
         wide[:, ::2] = tall
         wide[:, 1:-1:2] = 0.5 * (tall[:, :-1] + tall[:, 1:])
         wide[:, -1] = tall[:, -1]
-        return _blurred(wide, sigma)[first - top : last - top]
+        return _blurred(wide, SIGMA)[first - top : last - top]
 
     return Octave(0.5, (2 * height, 2 * width), rows)
 
@@ -118,9 +117,7 @@ def extrema(strip: Strip, least: float) -> NDArray[np.float32]:
     less than ``least`` grey levels and such on edges are left out. One place may come twice, with the same numbers.
     """
     rows = max(strip.first - strip.top, BORDER), min(strip.last - strip.top, strip.layers.shape[1] - BORDER)
-    found: NDArray[np.float32] = _extrema(strip.layers, rows[0], rows[1], np.float32(least))
-    found[:, 1] += np.float32(strip.top)
-    return found
+    return np.asarray(_extrema(strip.layers, strip.top, rows[0], rows[1], np.float32(least)))
 
 
 def sigma_of(layer: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -215,7 +212,7 @@ def _is_extremum(d: Any, i: int, y: int, x: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _extrema(d: Any, first: int, last: int, least: Any) -> Any:
+def _extrema(d: Any, top: int, first: int, last: int, least: Any) -> Any:
     out = np.empty((1024, 4), np.float32)
     marked = np.zeros(d.shape[2], np.bool_)
     count = 0
@@ -231,7 +228,7 @@ def _extrema(d: Any, first: int, last: int, least: Any) -> Any:
                         larger = np.empty((2 * count, 4), np.float32)
                         larger[:count] = out
                         out = larger
-                    out[count, 0], out[count, 1], out[count, 2], out[count, 3] = column, row, layer, contrast
+                    out[count, 0], out[count, 1], out[count, 2], out[count, 3] = column, top + row, layer, contrast
                     count += 1
     return out[:count].copy()
 
@@ -259,7 +256,7 @@ def _refined(d: Any, i: int, y: int, x: int) -> Any:
         ds = -(axs * gx + ays * gy + ass * gs) / determinant
         if not (abs(dx) < 1e3 and abs(dy) < 1e3 and abs(ds) < 1e3):
             break
-        if abs(dx) <= 0.5 and abs(dy) <= 0.5 and abs(ds) <= 0.5:
+        if max(abs(dx), abs(dy), abs(ds)) <= _NEAR:
             trace = hxx + hyy
             if ass <= 0 or trace * trace * _EDGE >= (_EDGE + 1) ** 2 * ass:
                 break
