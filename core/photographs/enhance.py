@@ -111,7 +111,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     return Result(request.survey)
 
 
-def check_window(method: str, window: int, photographs: Sequence[Photograph]) -> None:
+def check_window(method: Method, window: int, photographs: Sequence[Photograph]) -> None:
     """Refuse, before any work, a window that cannot be used on these photographs.
 
     Raises
