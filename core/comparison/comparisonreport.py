@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..photographs.enhance import enhanced_path
 from ..photographs.reading import decode_pixels
-from ..report.cloud import cloud_from_above, cloud_in_perspective, exaggeration
+from ..report.cloud import cloud_from_above, cloud_in_perspective
 from ..report.drawing import Picture, draw_coverage, draw_tie_points, side_by_side
 from ..report.html import Report, new_figure
 from ..survey import Survey
@@ -47,11 +47,7 @@ def write_report(
         report.figure(
             cloud_from_above(clouds, unit=unit), "Tie points from above, coloured by height; triangles: photographs.", dense=True
         )
-        report.figure(
-            cloud_in_perspective(clouds, unit=unit),
-            f"The same in perspective, heights {exaggeration(clouds):g} times enlarged (figure 4 of the paper).",
-            dense=True,
-        )
+        report.figure(cloud_in_perspective(clouds, unit=unit), "The same in perspective (figure 4 of the paper).", dense=True)
     report.save(path, copy)
 
 
@@ -87,9 +83,8 @@ def _tie_points(report: Report, outcomes: Sequence[Outcome]) -> None:
     axes = figure.add_subplot()
     values = [mtp(o) or 0.0 for o in outcomes]
     bars = axes.bar([o.case for o in outcomes], values, color=[_COLOURS[o.case] for o in outcomes], width=0.6)
-    axes.bar_label(
-        bars, [f"{v:,.0f}" if o.oriented else "not oriented" for v, o in zip(values, outcomes, strict=True)], fontsize=9
-    )
+    axes.bar_label(bars, [f"{v:,.0f}" if v else "" for v in values], label_type="center", color="white", fontsize=9)
+    axes.bar_label(bars, ["" if v else "not oriented" for v in values], fontsize=9)
     axes.set_ylabel("tie points per photograph (MTP)")
     axes.margins(y=0.15)
     if jpg.oriented:
