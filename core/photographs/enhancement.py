@@ -155,7 +155,8 @@ def low_passed(
         smooth = mean(values.astype(np.float32))
     else:
         share = mean(valid.astype(np.float32))
-        smooth = mean(np.where(valid, values, 0).astype(np.float32)) / np.maximum(share, np.float32(1e-6))
+        smooth = mean(np.where(valid, values, 0).astype(np.float32))
+        smooth /= np.maximum(share, np.float32(1e-6))
     smooth *= np.float32(scale)
     smooth += np.float32(0.5)
     return smooth.astype(np.uint32), scale, float((kernel.astype(float) ** 2).sum())
