@@ -55,7 +55,7 @@ class CompareInputs(StepAlgorithm):
             "METHOD",
             tr("Enhancement"),
             tr("How the enhanced cases are enhanced, as in 'Enhance photographs'; the others are only reduced to 8 bits."),
-            ("arctan", "micmac", "equalize"),
+            ("arctan", "micmac", "equalize", "bandpass"),
             default="arctan",
         )
         yield ask.integer(

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 class Settings:
     """What all cases share; the keys are those of the steps."""
 
-    method: Literal["arctan", "micmac", "equalize"]
+    method: Literal["arctan", "micmac", "equalize", "bandpass"]
     window: int
     max_size: int
     threshold: Literal["noise", "fixed"]

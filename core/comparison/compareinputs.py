@@ -16,7 +16,7 @@ from ..files import remove, scratch
 from ..orientation import georeference
 from ..photographs.enhance import check_window
 from ..progress import SILENT, Progress
-from ..tiepoints.tiepoints import CACHE
+from ..tiepoints.tiepoints import CACHE, check_limits
 from ..vector import check_destination, write_layer
 from .cases import Outcome, Settings, run_case
 from .comparisonreport import write_report
@@ -58,7 +58,7 @@ class Request:
     gnss_heights: Literal["ellipsoidal", "orthometric", "unknown"] = "unknown"
     geoid: str | None = None
     crs: str | None = None
-    method: Literal["arctan", "micmac", "equalize"] = "arctan"
+    method: Literal["arctan", "micmac", "equalize", "bandpass"] = "arctan"
     window: int = 101
     max_size: int = 0
     threshold: Literal["noise", "fixed"] = "noise"
@@ -97,6 +97,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     NotEnoughData
         When the photographs or the ground control are too few in any case.
     """
+    check_limits(0, request.max_size)
     control = _control(request)
     if request.table:
         check_destination(request.table)

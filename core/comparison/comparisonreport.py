@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..photographs.enhance import enhanced_path
+from ..photographs.enhancement import has_window
 from ..photographs.reading import decode_pixels
 from ..report.cloud import cloud_from_above, cloud_in_perspective
 from ..report.drawing import Picture, draw_coverage, draw_tie_points, side_by_side
@@ -54,7 +55,7 @@ def write_report(
 def _how(outcomes: Sequence[Outcome], settings: Settings) -> str:
     size = f"reduced to {settings.max_size} pixels" if settings.max_size else "at full size"
     above = "each photograph's own noise" if settings.threshold == "noise" else "one fixed contrast"
-    window = f" in a window of {settings.window} pixels" if settings.method in ("arctan", "micmac") else ""
+    window = f" in a window of {settings.window} pixels" if has_window(settings.method) else ""
     return (
         f"{outcomes[0].images} exposures, the same in every case, with the same positions, marks and settings: features sought "
         f"{size} above {above}, without a limit on their number. Ce: contrast enhanced by {settings.method}{window}; the "

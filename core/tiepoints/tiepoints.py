@@ -75,10 +75,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     NotEnoughData
         When there are no two photographs, or no two that share anything.
     """
-    if request.max_features < 0:
-        raise InputError(f"MAX_FEATURES={request.max_features} is negative: give a number, or 0 for no limit.")
-    if request.max_size < 0 or 0 < request.max_size < 200:
-        raise InputError(f"MAX_SIZE={request.max_size} is too small to find anything: give 200 or more, or 0 for full size.")
+    check_limits(request.max_features, request.max_size)
     Survey.open(request.survey)  # before a lock is put into a folder that is none
     with held(request.survey, "tiepoints"):
         survey = Survey.open(request.survey)
@@ -138,6 +135,20 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         _remove_strays(cache, {*found, *refined, *(cache / "matches" / f"{key}.npz" for key in keys)})
     progress.at(1.0)
     return result
+
+
+def check_limits(max_features: int, max_size: int) -> None:
+    """Refuse, before any work, limits under which nothing could be found.
+
+    Raises
+    ------
+    InputError
+        When one of them is such.
+    """
+    if max_features < 0:
+        raise InputError(f"MAX_FEATURES={max_features} is negative: give a number, or 0 for no limit.")
+    if max_size < 0 or 0 < max_size < 200:
+        raise InputError(f"MAX_SIZE={max_size} is too small to find anything: give 200 or more, or 0 for full size.")
 
 
 def _use_enhanced(request: Request, survey: Survey, progress: Progress) -> bool:

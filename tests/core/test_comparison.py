@@ -377,6 +377,7 @@ def test_marks_move_with_the_frame(flight, tmp_path, monkeypatch):
         ({"crs": "EPSG:4326"}, InputError, "is not projected"),
         ({"gcps": "EPSG:32632"}, InputError, "lie .* km from the photographs: set their right CRS"),
         ({"window": 100}, InputError, "WINDOW=100 is not an odd number"),
+        ({"max_size": 100}, InputError, "MAX_SIZE=100 is too small"),
         ({"window": 999}, InputError, "WINDOW=999 is larger than"),
         ({"table": "{0}/t.csv"}, InputError, "must be a GeoPackage"),
         ({"geoid": "45"}, InputError, "is unknown: say whether"),
