@@ -36,20 +36,20 @@ def write_database(
     keypoints: Iterable[NDArray[np.float32]],
     pairs: Mapping[tuple[int, int], PairMatches],
     *,
+    count: int,
     before: Callable[[], None] | None = None,
 ) -> None:
     """Write a database whose image ids are 1 + the index in ``photographs``; ``before`` is called before it takes its place.
 
-    ``keypoints`` (n, 4: x, y, scale, angle) come in the photographs' order; ``pairs`` maps two indices, the smaller first.
-    Photographs of one ``camera`` group and size share a camera.
+    ``keypoints`` (n, 4: x, y, scale, angle) come in the photographs' order, one photograph's at a time, ``count`` in all;
+    ``pairs`` maps two indices, the smaller first. Photographs of one ``camera`` group and size share a camera.
     """
-    points = list(keypoints)
     # Until SQLite is closed it keeps all twice; matches are written twice; and a full disk would end the process.
-    room = 3 * (sum(p.nbytes for p in points) + 2 * sum(p.matches.nbytes for p in pairs.values())) + (1 << 20)
+    room = 3 * (16 * count + 2 * sum(p.matches.nbytes for p in pairs.values())) + (1 << 20)
     with whole(path, room=room, before=before) as part:
         database = pycolmap.Database.open(part)
         try:
-            _fill(database, photographs, points, pairs)
+            _fill(database, photographs, keypoints, pairs)
         finally:
             database.close()
 

@@ -100,7 +100,9 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
                 + ("." if enhanced else ", and run strandline:enhance first.")
             )
         keypoints = (read_refined(s, path)[0] for s, path in zip(sources, refined, strict=True))
-        write_database(survey.folder / NAME, photographs, keypoints, pairs, before=lambda: survey.forget("tiepoints"))
+        write_database(
+            survey.folder / NAME, photographs, keypoints, pairs, count=sum(counts), before=lambda: survey.forget("tiepoints")
+        )
         match_count = sum(len(p.matches) for p in pairs.values())
         groups = blocks(len(photographs), pairs)
         ties = count_ties(photographs, found, pairs)

@@ -73,7 +73,7 @@ def simulate(folder, strips=3, length=4, points=1500, seed=0, outliers=0.02):
                 matches = np.array([[index[i][p], index[j][p]] for p in both], np.int32)
                 config = int(pycolmap.TwoViewGeometryConfiguration.UNCALIBRATED)
                 pairs[i, j] = PairMatches(matches, config, np.zeros((3, 3)), np.zeros((3, 3)), np.eye(3))
-    write_database(folder / "features.db", photographs, keypoints, pairs)
+    write_database(folder / "features.db", photographs, keypoints, pairs, count=sum(map(len, keypoints)))
     return folder / "features.db", centres
 
 
@@ -105,7 +105,7 @@ def test_the_database_opens_and_groups_cameras(tmp_path):
     ]
     points = [np.array([[1.5, 2.5, 3.0, 0.1], [5.0, 6.0, 2.0, 0.0]], np.float32)] * 3
     pair = PairMatches(np.array([[1, 0]], np.int32), 3, np.zeros((3, 3)), np.eye(3), np.eye(3))
-    write_database(tmp_path / "f.db", photographs, points, {(0, 2): pair})
+    write_database(tmp_path / "f.db", photographs, points, {(0, 2): pair}, count=sum(map(len, points)))
     database = pycolmap.Database.open(tmp_path / "f.db")
     assert (database.num_images(), database.num_cameras(), database.num_rigs(), database.num_frames()) == (3, 2, 2, 3)
     image = database.read_image_with_name("b/3.jpg")
