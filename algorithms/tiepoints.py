@@ -19,8 +19,9 @@ class TiePoints(StepAlgorithm):
             "survey",
             tr("Find tie points"),
             tr(
-                "Finds features in the photographs and matches them between overlapping ones. The matches that agree with one "
-                "geometry are kept in features.db, a COLMAP database."
+                "Finds features in the photographs and matches them between overlapping ones. What agrees with one geometry is "
+                "laid on each other to some hundredths of a pixel by least-squares matching, and kept in features.db, a COLMAP "
+                "database."
             ),
         )
 
@@ -50,8 +51,9 @@ class TiePoints(StepAlgorithm):
             "PAIRS",
             tr("Pairs"),
             tr(
-                "auto: neighbours by position, or by order and likeness when there are no positions; exhaustive: every pair; "
-                "sequential: neighbours in the order of the flight."
+                "auto: neighbours by position; without positions every pair of up to 60 photographs, and beyond these neighbours in "
+                "the order of the flight, which ties neighbouring strips in few places. exhaustive: every pair; sequential: "
+                "neighbours in the order of the flight. Pairs that matched ones point to are added."
             ),
             ("auto", "exhaustive", "sequential"),
             default="auto",

@@ -145,7 +145,7 @@ def verify(first: Features, second: Features, cameras: tuple[Camera, Camera], ma
     if len(matches) < LEAST:
         return PairMatches.none()
     limit = LIMIT * max(*(max(c.width, c.height) for c in cameras))
-    xy = [f.xy[k].astype(np.float64) for f, k in zip((first, second), matches.T, strict=True)]
+    one, two = (f.xy[k].astype(np.float64) for f, k in zip((first, second), matches.T, strict=True))
     likeness = _likeness(first, second, matches)
     some = spread(first.xy[matches[:, 0]], likeness, (cameras[0].width, cameras[0].height), _SOME)
     options = pycolmap.TwoViewGeometryOptions()
@@ -157,12 +157,12 @@ def verify(first: Features, second: Features, cameras: tuple[Camera, Camera], ma
     for camera in given:
         camera.has_prior_focal_length = False  # an uncertain focal length must not reject matches
     index = np.column_stack([np.arange(len(some), dtype=np.uint32)] * 2)
-    found = pycolmap.estimate_two_view_geometry(given[0], xy[0][some], given[1], xy[1][some], index, options)
+    found = pycolmap.estimate_two_view_geometry(given[0], one[some], given[1], two[some], index, options)
     essential, fundamental, plane = (np.zeros((3, 3)) if m is None else np.array(m, float) for m in (found.E, found.F, found.H))
-    good = _agree(*xy, fundamental, plane, limit)
+    good = _agree(one, two, fundamental, plane, limit)
     if min(good.sum(), len(found.inlier_matches)) < LEAST:
         return PairMatches.none()
-    fitted, _ = cv2.findHomography(xy[0][good], xy[1][good], 0)
+    fitted, _ = cv2.findHomography(one[good], two[good], 0)
     # A homography that sends the photograph's corner to infinity cannot predict anything.
     usable = fitted is not None and abs(fitted[2, 2]) > 1e-9
     homography = fitted / fitted[2, 2] if usable else np.zeros((3, 3))
