@@ -51,7 +51,7 @@ class TiePoints(StepAlgorithm):
             "PAIRS",
             tr("Pairs"),
             tr(
-                "auto: neighbours by position; without positions every pair of up to 60 photographs, and beyond these neighbours in "
+                "auto: neighbours by position; without positions every pair of up to 60 photographs, beyond these neighbours in "
                 "the order of the flight, which ties neighbouring strips in few places. exhaustive: every pair; sequential: "
                 "neighbours in the order of the flight. Pairs that matched ones point to are added."
             ),
