@@ -19,14 +19,13 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import whole
 from .descriptors import SUPPORT, describe
-from .noise import NoiseMap, noise_gain, noise_map
+from .noise import LEAST_NOISE, NoiseMap, noise_gain, noise_map
 from .scalespace import LAYERS, Octave, differences, extrema, finer_octave, gaussians, layer_of, octaves, sigma_of
 
 Threshold = Literal["noise", "fixed"]
 
-VERSION = 3  # part of the key under which features are kept: raise it when the same image would give others
-_TIMES_NOISE = 3.0  # independent noise of any level leaves some 200 features per megapixel above it, of 4,500
-_FAINTEST = 0.02  # grey levels: less than three times what the least noise leaves at the coarsest scale of an octave
+VERSION = 4  # part of the key under which features are kept: raise it when the same image would give others
+_TIMES_NOISE = 2.5  # independent noise of any level leaves some 1,000 features per megapixel above it, of 4,500
 _FIXED = 0.01 * 255 / LAYERS  # grey levels: the contrast 0.01 as OpenCV counts it
 _CELLS = 16  # along the longer side, among which features are shared out: more cells cost matches and cover no more ground
 _LEAST = 16  # pixels of the shorter side of the smallest image that is searched
@@ -80,7 +79,7 @@ def detect(
     max_size
         Longer side (pixels) of the image searched; 0 for the image as it is.
     threshold
-        The contrast a feature needs: ``noise``, three times what the noise where it stands leaves at its scale; ``fixed``,
+        The contrast a feature needs: ``noise``, 2.5 times what the noise where it stands leaves at its scale; ``fixed``,
         0.01 as OpenCV counts it.
     mask
         Where features may lie (rows, columns). None is found whose descriptor reaches out of it, or to where the
@@ -172,9 +171,12 @@ def _free_radius(image: NDArray[np.uint8], mask: NDArray[np.bool_] | None) -> ND
 def _search(octave: Octave, noise: NoiseMap, free: NDArray[np.float32] | None, threshold: Threshold) -> NDArray[Any]:
     """Return the features of an octave, in pixels of the image searched; ``score`` is their contrast over its noise."""
     pixel = np.float32(octave.pixel)
+    # No threshold of the octave is below that of the least noise at its coarsest scale.
+    coarsest = sigma_of(np.array([LAYERS + 1], np.float32)) * pixel
+    least = _FIXED if threshold == "fixed" else _TIMES_NOISE * LEAST_NOISE * float(noise_gain(coarsest)[0])
     parts = []
     for strip in differences(octave):
-        column, row, layer, contrast = extrema(strip, _FIXED if threshold == "fixed" else _FAINTEST).T
+        column, row, layer, contrast = extrema(strip, least).T
         part = np.empty(len(column), _FOUND)
         part["xy"] = np.column_stack([column, row]) * pixel + np.float32(0.5)
         part["scale"] = sigma_of(layer) * pixel

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .scalespace import LAYERS
 
 _HALF = 16  # half a window of the local mean, in pairs of pixels
-_ROUNDING = 1.0 / math.sqrt(12.0)  # grey levels: the noise of rounding to whole ones, below which nothing is believed
+LEAST_NOISE = 1.0 / math.sqrt(12.0)  # grey levels: the noise of rounding to whole ones, below which nothing is believed
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def noise_map(image: NDArray[np.uint8]) -> NoiseMap:
     side = 2 * _HALF + 1
     mean = cv2.blur(size, (side, side), borderType=cv2.BORDER_REFLECT_101)
     # The filter's gain on white noise is 6, the mean size of a normal variable sqrt(2 / pi) sigma, the mean of four halves sigma.
-    return NoiseMap(np.maximum(np.float32(2 * math.sqrt(math.pi / 2) / 6) * mean, np.float32(_ROUNDING)))
+    return NoiseMap(np.maximum(np.float32(2 * math.sqrt(math.pi / 2) / 6) * mean, np.float32(LEAST_NOISE)))
 
 
 def noise_gain(sigma: NDArray[np.float32]) -> NDArray[np.float32]:

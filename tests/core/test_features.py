@@ -108,14 +108,14 @@ def test_noise_is_measured(sigma):
 
 @pytest.mark.parametrize("sigma", [0.1, 0.4, 1.0, 3.0, 10.0, 30.0])
 def test_independent_noise_of_any_level_gives_few_features(sigma):
-    # Extrema of white noise beyond three sigmas: 0.8 megapixels, about 200 each; fixed contrast gives none to 4,500.
-    assert len(detect(white(sigma), max_features=0, max_size=0)) < 250 * 0.8
+    # Extrema of white noise beyond 2.5 sigmas: 0.8 megapixels, about 1,000 each; fixed contrast gives none to 4,500.
+    assert len(detect(white(sigma), max_features=0, max_size=0)) < 1200 * 0.8
 
 
 def test_noise_that_varies_over_the_image_is_followed():
     ramp = np.linspace(1, 20, 1000) * np.random.default_rng(0).normal(0, 1, (800, 1000))
     found = detect(np.clip(np.rint(128 + ramp), 0, 255).astype(np.uint8), max_features=0, max_size=0)
-    assert len(found) < 250 * 0.8
+    assert len(found) < 1200 * 0.8
     # One threshold for all would find them where the noise is strong.
     left = (found.xy[:, 0] < 500).mean()
     assert 0.3 < left < 0.7
@@ -126,8 +126,8 @@ def test_correlated_noise_is_held_below_its_stated_rate():
     grey = np.rint(bayer.mean(axis=2) / 16).astype(np.uint8)
     coded = cv2.imdecode(cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, 90])[1], cv2.IMREAD_GRAYSCALE)
     for image in (grey, coded):
-        # Interpolated colours double the noise at the scale of features; white noise of the same pixels gives 200.
-        assert len(detect(image, max_features=0, max_size=0)) < 20000 * 0.8
+        # Interpolated colours double the noise at the scale of features; white noise gives 1,000.
+        assert len(detect(image, max_features=0, max_size=0)) < 22000 * 0.8
 
 
 def test_faint_coarse_features_in_noise_are_found():
