@@ -56,7 +56,7 @@ class CompareInputs(StepAlgorithm):
             tr("Enhancement"),
             tr("How the enhanced cases are enhanced, as in 'Enhance photographs'; the others are only reduced to 8 bits."),
             ("arctan", "micmac", "equalize", "bandpass"),
-            default="arctan",
+            default="bandpass",
         )
         yield ask.integer(
             "WINDOW", tr("Window"), tr("Side of the enhancement's square window in pixels, an odd number."), default=101, least=3

@@ -31,12 +31,12 @@ class Enhance(StepAlgorithm):
             "METHOD",
             tr("Method"),
             tr(
-                "arctan: each pixel against the mean and deviation of its window, through an arc tangent; micmac: MicMac's variant; "
-                "equalize: the image's whole histogram; none: only reduced to 8 bits; bandpass: as arctan, of an image from which "
-                "the finest noise has been taken, which gives more tie points on sand."
+                "bandpass: the noise of single pixels is taken off, then as arctan; it gives the most tie points on sand. arctan: each "
+                "pixel against the mean and deviation of its window, through an arc tangent (Rosu et al. 2015). micmac: MicMac's "
+                "variant. equalize: the image's whole histogram. none: only reduced to 8 bits."
             ),
             ("arctan", "micmac", "equalize", "none", "bandpass"),
-            default="arctan",
+            default="bandpass",
         )
         yield ask.integer(
             "WINDOW",

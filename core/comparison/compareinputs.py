@@ -58,7 +58,7 @@ class Request:
     gnss_heights: Literal["ellipsoidal", "orthometric", "unknown"] = "unknown"
     geoid: str | None = None
     crs: str | None = None
-    method: Literal["arctan", "micmac", "equalize", "bandpass"] = "arctan"
+    method: Literal["arctan", "micmac", "equalize", "bandpass"] = "bandpass"
     window: int = 101
     max_size: int = 0
     threshold: Literal["noise", "fixed"] = "noise"

@@ -31,7 +31,7 @@ class Request:
     """``window`` is the side of the square window in pixels, odd."""
 
     survey: str
-    method: Method = "arctan"
+    method: Method = "bandpass"
     window: int = 101
     ignore: VectorSource | None = None
     workers: int = 0

@@ -99,7 +99,7 @@ def test_what_is_not_given_is_null_and_defaults_are_sent(sent, survey):
 
 def test_none_is_the_default_as_a_model_passes_it(sent, survey):
     request = sent("enhance", {"SURVEY": survey, "METHOD": None, "WINDOW": None, "IGNORE": None, "OUTPUT_HTML_FILE": None})
-    assert (request["method"], request["window"], request["ignore"], request["output_html_file"]) == ("arctan", 101, None, None)
+    assert (request["method"], request["window"], request["ignore"], request["output_html_file"]) == ("bandpass", 101, None, None)
 
 
 def test_values_arrive_by_type(sent, survey, tmp_path):
