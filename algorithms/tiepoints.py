@@ -20,7 +20,7 @@ class TiePoints(StepAlgorithm):
             tr("Find tie points"),
             tr(
                 "Finds features in the photographs and matches them between overlapping ones. What agrees with one geometry is "
-                "laid on each other to some hundredths of a pixel by least-squares matching, and kept in features.db, a COLMAP "
+                "laid on each other to a fraction of a pixel by least-squares matching, and kept in features.db, a COLMAP "
                 "database."
             ),
         )

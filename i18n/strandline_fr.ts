@@ -80,6 +80,118 @@
    <translation>Le moteur n'a pas pu être installé : {} (voir les lignes ci-dessus).</translation>
   </message>
   <message>
+   <source>Compare inputs</source>
+   <translation>Comparer les entrées</translation>
+  </message>
+  <message>
+   <source>Takes the same flight four times through tie points, orientation and georeferencing, with the same settings: as JPG, as RAW, and both enhanced (CeJPG, CeRAW); as JPG alone it makes two cases. The report says which gives the most tie points, the best coverage and the smallest errors on check points on your ground, and whether enhancement and RAW were worth it. It takes as long as all the cases together: try it on a part of a flight.</source>
+   <translation>Fait passer quatre fois le même vol par les points de liaison, l'orientation et le géoréférencement, avec les mêmes réglages : en JPG, en RAW, et les deux rehaussés (CeJPG, CeRAW) ; en JPG seul, cela fait deux cas. Le rapport dit lequel donne le plus de points de liaison, la meilleure couverture et les plus petites erreurs aux points de contrôle sur votre terrain, et si le rehaussement et le RAW en valaient la peine. Cela dure autant que tous les cas réunis : essayez sur une partie d'un vol.</translation>
+  </message>
+  <message>
+   <source>Folder of JPG photographs</source>
+   <translation>Dossier de photographies JPG</translation>
+  </message>
+  <message>
+   <source>Photographs of one flight (JPG, TIFF, PNG); sub-folders count.</source>
+   <translation>Photographies d'un seul vol (JPG, TIFF, PNG) ; les sous-dossiers comptent.</translation>
+  </message>
+  <message>
+   <source>Folder of RAW photographs</source>
+   <translation>Dossier de photographies RAW</translation>
+  </message>
+  <message>
+   <source>The same exposures as RAW, under the same names; it may be the same folder. Empty: JPG alone, two cases.</source>
+   <translation>Les mêmes prises de vue en RAW, sous les mêmes noms ; ce peut être le même dossier. Vide : JPG seul, deux cas.</translation>
+  </message>
+  <message>
+   <source>Marks in the RAW photographs</source>
+   <translation>Pointés dans les photographies RAW</translation>
+  </message>
+  <message>
+   <source>Only where the camera straightens its JPG, so that the RAW shows a point elsewhere by more than a shift; a JPG that is merely cut out of the RAW is recognised.</source>
+   <translation>Seulement si l'appareil redresse son JPG, de sorte que le RAW montre un point ailleurs par plus qu'un décalage ; un JPG simplement découpé dans le RAW est reconnu.</translation>
+  </message>
+  <message>
+   <source>CRS of the surveys</source>
+   <translation>SCR des levés</translation>
+  </message>
+  <message>
+   <source>Projected CRS of the results; empty: the UTM zone of the positions.</source>
+   <translation>SCR projeté des résultats ; vide : la zone UTM des positions.</translation>
+  </message>
+  <message>
+   <source>Enhancement</source>
+   <translation>Rehaussement</translation>
+  </message>
+  <message>
+   <source>How the enhanced cases are enhanced, as in 'Enhance photographs'; the others are only reduced to 8 bits.</source>
+   <translation>Comment les cas rehaussés le sont, comme dans « Rehausser les photographies » ; les autres sont seulement ramenés à 8 bits.</translation>
+  </message>
+  <message>
+   <source>Window</source>
+   <translation>Fenêtre</translation>
+  </message>
+  <message>
+   <source>Side of the enhancement's square window in pixels, an odd number.</source>
+   <translation>Côté de la fenêtre carrée du rehaussement en pixels, un nombre impair.</translation>
+  </message>
+  <message>
+   <source>Longest side</source>
+   <translation>Plus grand côté</translation>
+  </message>
+  <message>
+   <source>Photographs are reduced to this many pixels on their longer side before features are sought; 0 is full size.</source>
+   <translation>Les photographies sont réduites à autant de pixels sur leur plus grand côté avant la recherche ; 0 garde leur pleine taille.</translation>
+  </message>
+  <message>
+   <source>Camera model</source>
+   <translation>Modèle d'appareil</translation>
+  </message>
+  <message>
+   <source>The lens distortion that is estimated, as in 'Orient photographs'.</source>
+   <translation>La distorsion de l'objectif qui est estimée, comme dans « Orienter les photographies ».</translation>
+  </message>
+  <message>
+   <source>Comparison</source>
+   <translation>Comparaison</translation>
+  </message>
+  <message>
+   <source>A row for each case: tie points, their residual, coverage, errors on ground points.</source>
+   <translation>Une ligne par cas : points de liaison, leur résidu, couverture, erreurs aux points au sol.</translation>
+  </message>
+  <message>
+   <source>Folder to keep the surveys in</source>
+   <translation>Dossier où garder les levés</translation>
+  </message>
+  <message>
+   <source>The survey of each case is kept there, and an interrupted comparison goes on. Empty: they go at the end.</source>
+   <translation>Le levé de chaque cas y est gardé, et une comparaison interrompue continue. Vide : ils disparaissent à la fin.</translation>
+  </message>
+  <message>
+   <source>Exposures compared</source>
+   <translation>Prises de vue comparées</translation>
+  </message>
+  <message>
+   <source>Tie points per photograph, JPG</source>
+   <translation>Points de liaison par photographie, JPG</translation>
+  </message>
+  <message>
+   <source>Tie points per photograph, RAW</source>
+   <translation>Points de liaison par photographie, RAW</translation>
+  </message>
+  <message>
+   <source>Tie points per photograph, enhanced JPG</source>
+   <translation>Points de liaison par photographie, JPG rehaussé</translation>
+  </message>
+  <message>
+   <source>Tie points per photograph, enhanced RAW</source>
+   <translation>Points de liaison par photographie, RAW rehaussé</translation>
+  </message>
+  <message>
+   <source>Most tie points over those of the JPG</source>
+   <translation>Plus grand nombre de points de liaison rapporté à celui du JPG</translation>
+  </message>
+  <message>
    <source>Create survey</source>
    <translation>Créer un levé</translation>
   </message>
@@ -380,12 +492,8 @@
    <translation>Méthode</translation>
   </message>
   <message>
-   <source>arctan: each pixel against the mean and deviation of its window, through an arc tangent (the best on sand); micmac: MicMac's variant; equalize: the image's whole histogram; none: only reduced to 8 bits.</source>
-   <translation>arctan : chaque pixel selon la moyenne et l'écart-type de sa fenêtre, à travers un arc tangente (le meilleur sur le sable) ; micmac : la variante de MicMac ; equalize : l'histogramme de toute l'image ; none : seulement ramenée à 8 bits.</translation>
-  </message>
-  <message>
-   <source>Window</source>
-   <translation>Fenêtre</translation>
+   <source>bandpass: the noise of single pixels is taken off, then as arctan; it gives the most tie points on sand. arctan: each pixel against the mean and deviation of its window, through an arc tangent (Rosu et al. 2015). micmac: MicMac's variant. equalize: the image's whole histogram. none: only reduced to 8 bits.</source>
+   <translation>bandpass : le bruit des pixels isolés est ôté, puis comme arctan ; c'est ce qui donne le plus de points de liaison sur le sable. arctan : chaque pixel rapporté à la moyenne et à l'écart type de sa fenêtre, par un arc tangente (Rosu et al. 2015). micmac : la variante de MicMac. equalize : l'histogramme entier de l'image. none : seulement ramené à 8 bits.</translation>
   </message>
   <message>
    <source>Side of the square window in pixels, an odd number. Larger windows keep more of the broad shapes.</source>
@@ -532,46 +640,6 @@
    <translation>similarity : translation, rotation et échelle seules, la forme du bloc demeure ; adjustment : une compensation par faisceaux dans laquelle les points d'appui corrigent aussi la forme.</translation>
   </message>
   <message>
-   <source>Use the positions of the photographs</source>
-   <translation>Utiliser les positions des photographies</translation>
-  </message>
-  <message>
-   <source>The photographs' GNSS positions take part, each with the accuracy it claims.</source>
-   <translation>Les positions GNSS des photographies participent, chacune avec la précision qu'elle annonce.</translation>
-  </message>
-  <message>
-   <source>Lever arm</source>
-   <translation>Bras de levier</translation>
-  </message>
-  <message>
-   <source>From the camera to the GNSS antenna in metres, three numbers: right, forward, up, of the levelled aircraft.</source>
-   <translation>De l'antenne GNSS à l'appareil en mètres, trois nombres : droite, avant, haut, de l'aéronef à l'horizontale.</translation>
-  </message>
-  <message>
-   <source>Heights of the ground points</source>
-   <translation>Hauteurs des points au sol</translation>
-  </message>
-  <message>
-   <source>What the ground points' heights refer to: the ellipsoid, or mean sea level (orthometric).</source>
-   <translation>À quoi se rapportent les hauteurs des points au sol : l'ellipsoïde, ou le niveau moyen de la mer (orthometric).</translation>
-  </message>
-  <message>
-   <source>Heights of the photographs</source>
-   <translation>Hauteurs des photographies</translation>
-  </message>
-  <message>
-   <source>What the heights of the photographs' positions refer to: the ellipsoid, or mean sea level (orthometric).</source>
-   <translation>À quoi se rapportent les hauteurs des positions des photographies : l'ellipsoïde, ou le niveau moyen de la mer (orthometric).</translation>
-  </message>
-  <message>
-   <source>Geoid</source>
-   <translation>Géoïde</translation>
-  </message>
-  <message>
-   <source>A raster of geoid heights, or one number in metres. Needed when the two kinds of heights differ.</source>
-   <translation>Un raster des hauteurs du géoïde, ou un nombre en mètres. Nécessaire quand les deux sortes de hauteurs diffèrent.</translation>
-  </message>
-  <message>
    <source>Polygons of water, people or vehicles; tie points in them take no part.</source>
    <translation>Polygones d'eau, de personnes ou de véhicules ; les points de liaison qui s'y trouvent ne participent pas.</translation>
   </message>
@@ -594,6 +662,54 @@
   <message>
    <source>Where each photograph was taken from, as computed.</source>
    <translation>D'où chaque photographie a été prise, selon le calcul.</translation>
+  </message>
+  <message>
+   <source>Nothing to georeference with: give GCPS with MARKS, GCP_FILE, or USE_GNSS.</source>
+   <translation>Rien pour géoréférencer : donnez GCPS avec MARKS, GCP_FILE, ou USE_GNSS.</translation>
+  </message>
+  <message>
+   <source>Control points</source>
+   <translation>Points d'appui</translation>
+  </message>
+  <message>
+   <source>Check points</source>
+   <translation>Points de contrôle</translation>
+  </message>
+  <message>
+   <source>Error on control points, plan (m)</source>
+   <translation>Erreur sur les points d'appui, planimétrie (m)</translation>
+  </message>
+  <message>
+   <source>Error on control points, height (m)</source>
+   <translation>Erreur sur les points d'appui, altimétrie (m)</translation>
+  </message>
+  <message>
+   <source>Error on check points, plan (m)</source>
+   <translation>Erreur sur les points de contrôle, planimétrie (m)</translation>
+  </message>
+  <message>
+   <source>Error on check points, height (m)</source>
+   <translation>Erreur sur les points de contrôle, altimétrie (m)</translation>
+  </message>
+  <message>
+   <source>Error on points left out, plan (m)</source>
+   <translation>Erreur sur les points écartés, planimétrie (m)</translation>
+  </message>
+  <message>
+   <source>Error on points left out, height (m)</source>
+   <translation>Erreur sur les points écartés, altimétrie (m)</translation>
+  </message>
+  <message>
+   <source>Residual of the photographs' positions, plan (m)</source>
+   <translation>Résidu des positions des photographies, planimétrie (m)</translation>
+  </message>
+  <message>
+   <source>Residual of the photographs' positions, height (m)</source>
+   <translation>Résidu des positions des photographies, altimétrie (m)</translation>
+  </message>
+  <message>
+   <source>Doming (m)</source>
+   <translation>Effet de dôme (m)</translation>
   </message>
   <message>
    <source>Ground points</source>
@@ -672,10 +788,6 @@
    <translation>Au lieu des deux : un gcp_list.txt d'OpenDroneMap, ou un fichier de Metashape ou de MicMac.</translation>
   </message>
   <message>
-   <source>Check points</source>
-   <translation>Points de contrôle</translation>
-  </message>
-  <message>
    <source>Names of ground points that shall only check, separated by commas.</source>
    <translation>Noms des points au sol qui ne doivent que contrôler, séparés par des virgules.</translation>
   </message>
@@ -686,6 +798,46 @@
   <message>
    <source>Standard deviation of a mark.</source>
    <translation>Écart-type d'un pointé.</translation>
+  </message>
+  <message>
+   <source>Use the positions of the photographs</source>
+   <translation>Utiliser les positions des photographies</translation>
+  </message>
+  <message>
+   <source>The photographs' GNSS positions take part, each with the accuracy it claims.</source>
+   <translation>Les positions GNSS des photographies participent, chacune avec la précision qu'elle annonce.</translation>
+  </message>
+  <message>
+   <source>Lever arm</source>
+   <translation>Bras de levier</translation>
+  </message>
+  <message>
+   <source>From the camera to the GNSS antenna in metres, three numbers: right, forward, up, of the levelled aircraft.</source>
+   <translation>De l'antenne GNSS à l'appareil en mètres, trois nombres : droite, avant, haut, de l'aéronef à l'horizontale.</translation>
+  </message>
+  <message>
+   <source>Heights of the ground points</source>
+   <translation>Hauteurs des points au sol</translation>
+  </message>
+  <message>
+   <source>What the ground points' heights refer to: the ellipsoid, or mean sea level (orthometric).</source>
+   <translation>À quoi se rapportent les hauteurs des points au sol : l'ellipsoïde, ou le niveau moyen de la mer (orthometric).</translation>
+  </message>
+  <message>
+   <source>Heights of the photographs</source>
+   <translation>Hauteurs des photographies</translation>
+  </message>
+  <message>
+   <source>What the heights of the photographs' positions refer to: the ellipsoid, or mean sea level (orthometric).</source>
+   <translation>À quoi se rapportent les hauteurs des positions des photographies : l'ellipsoïde, ou le niveau moyen de la mer (orthometric).</translation>
+  </message>
+  <message>
+   <source>Geoid</source>
+   <translation>Géoïde</translation>
+  </message>
+  <message>
+   <source>A raster of geoid heights, or one number in metres. Needed when the two kinds of heights differ.</source>
+   <translation>Un raster des hauteurs du géoïde, ou un nombre en mètres. Nécessaire quand les deux sortes de hauteurs diffèrent.</translation>
   </message>
   <message>
    <source>GCPS and GCP_FILE exclude each other: give one of them.</source>
@@ -700,60 +852,12 @@
    <translation>GCPS demande MARKS : donnez la table de leurs places dans les photographies.</translation>
   </message>
   <message>
-   <source>Nothing to georeference with: give GCPS with MARKS, GCP_FILE, or USE_GNSS.</source>
-   <translation>Rien pour géoréférencer : donnez GCPS avec MARKS, GCP_FILE, ou USE_GNSS.</translation>
-  </message>
-  <message>
-   <source>Control points</source>
-   <translation>Points d'appui</translation>
-  </message>
-  <message>
-   <source>Error on control points, plan (m)</source>
-   <translation>Erreur sur les points d'appui, planimétrie (m)</translation>
-  </message>
-  <message>
-   <source>Error on control points, height (m)</source>
-   <translation>Erreur sur les points d'appui, altimétrie (m)</translation>
-  </message>
-  <message>
-   <source>Error on check points, plan (m)</source>
-   <translation>Erreur sur les points de contrôle, planimétrie (m)</translation>
-  </message>
-  <message>
-   <source>Error on check points, height (m)</source>
-   <translation>Erreur sur les points de contrôle, altimétrie (m)</translation>
-  </message>
-  <message>
-   <source>Error on points left out, plan (m)</source>
-   <translation>Erreur sur les points écartés, planimétrie (m)</translation>
-  </message>
-  <message>
-   <source>Error on points left out, height (m)</source>
-   <translation>Erreur sur les points écartés, altimétrie (m)</translation>
-  </message>
-  <message>
-   <source>Residual of the photographs' positions, plan (m)</source>
-   <translation>Résidu des positions des photographies, planimétrie (m)</translation>
-  </message>
-  <message>
-   <source>Residual of the photographs' positions, height (m)</source>
-   <translation>Résidu des positions des photographies, altimétrie (m)</translation>
-  </message>
-  <message>
-   <source>Doming (m)</source>
-   <translation>Effet de dôme (m)</translation>
-  </message>
-  <message>
    <source>Orient photographs</source>
    <translation>Orienter les photographies</translation>
   </message>
   <message>
    <source>Finds from the tie points where each photograph was taken and how the camera draws, in a free frame without scale. 'Georeference' brings the result to the ground.</source>
    <translation>Trouve à partir des points de liaison d'où chaque photographie a été prise et comment l'appareil dessine, dans un repère libre sans échelle. « Géoréférencer » rattache le résultat au terrain.</translation>
-  </message>
-  <message>
-   <source>Camera model</source>
-   <translation>Modèle d'appareil</translation>
   </message>
   <message>
    <source>brown: focal length, principal point, two radial and two tangential terms; radial: focal length, principal point, two radial terms; simple_radial: one radial term; full: with rational radial terms, for wide lenses and many photographs.</source>
@@ -824,6 +928,14 @@
    <translation>Le dossier que « Créer un levé » a fait. L'étape y ajoute ses fichiers.</translation>
   </message>
   <message>
+   <source>noise: features that stand out of each photograph's own noise; fixed: features above one contrast for all photographs, as other programs take them, to compare with.</source>
+   <translation>noise : les détails qui ressortent du bruit propre à chaque photographie ; fixed : ceux qui dépassent un même contraste pour toutes les photographies, comme les prennent d'autres logiciels, pour comparer.</translation>
+  </message>
+  <message>
+   <source>Threshold</source>
+   <translation>Seuil</translation>
+  </message>
+  <message>
    <source>How many processes work side by side; 0 is one per processor. Each takes memory: use fewer if it runs short.</source>
    <translation>Combien de processus travaillent côte à côte ; 0 en prend un par processeur. Chacun prend de la mémoire : réduisez-en le nombre si elle manque.</translation>
   </message>
@@ -860,8 +972,8 @@
    <translation>Simuler un levé</translation>
   </message>
   <message>
-   <source>Renders the photographs of a flight over an invented beach, with ground points, marks, zones, and the true surfaces and volumes: to learn the steps, to plan a flight, or to see what accuracy to expect.</source>
-   <translation>Calcule les photographies d'un vol au-dessus d'une plage inventée, avec points au sol, pointés, zones, et les surfaces et volumes vrais : pour apprendre les étapes, préparer un vol ou voir quelle exactitude attendre.</translation>
+   <source>Renders the photographs of a flight over an invented beach, each as RAW and as JPG, with ground points, marks, zones, and the true surfaces and volumes: to learn the steps, to plan a flight, or to see what to expect of it.</source>
+   <translation>Calcule les photographies d'un vol au-dessus d'une plage inventée, chacune en RAW et en JPG, avec points au sol, pointés, zones, et les surfaces et volumes vrais : pour apprendre les étapes, préparer un vol, ou voir ce qu'on peut en attendre.</translation>
   </message>
   <message>
    <source>Dates</source>
@@ -956,16 +1068,16 @@
    <translation>Contraste</translation>
   </message>
   <message>
-   <source>Standard deviation of the sand's brightness relative to its mean: 0.04 is dry sand under an even sky.</source>
-   <translation>Écart-type de la luminosité du sable rapporté à sa moyenne : 0,04 est du sable sec sous un ciel uniforme.</translation>
+   <source>Standard deviation of the sand's own brightness relative to its mean, over features from 2 cm to 3 m: 0.04 is common, 0.012 very bare. Slopes and ripples add their shading.</source>
+   <translation>Écart type de la clarté propre du sable rapporté à sa moyenne, pour des détails de 2 cm à 3 m : 0,04 est courant, 0,012 très nu. Pentes et rides ajoutent leur ombrage.</translation>
   </message>
   <message>
    <source>Noise</source>
    <translation>Bruit</translation>
   </message>
   <message>
-   <source>Of the sensor: 1 is a small drone camera at its lowest ISO, 0 is none.</source>
-   <translation>Du capteur : 1 est un petit appareil de drone à sa sensibilité la plus basse, 0 est aucun.</translation>
+   <source>Of light and sensor: 1 is a small drone camera at its lowest ISO, 0 is none.</source>
+   <translation>De la lumière et du capteur : 1 est un petit appareil de drone à sa sensibilité la plus basse, 0 aucun.</translation>
   </message>
   <message>
    <source>GNSS accuracy in plan (m)</source>
@@ -1000,8 +1112,8 @@
    <translation>Dossier</translation>
   </message>
   <message>
-   <source>Folder to make, with photographs, ground points, marks, zones and truth.</source>
-   <translation>Dossier à créer, avec photographies, points au sol, pointés, zones et vérité.</translation>
+   <source>Folder to make, with photographs (jpg, raw), ground points, marks, zones and truth.</source>
+   <translation>Dossier à créer, avec photographies (jpg, raw), points au sol, pointés, zones et vérité.</translation>
   </message>
   <message>
    <source>Photographs per date</source>
@@ -1028,8 +1140,8 @@
    <translation>Chercher les points de liaison</translation>
   </message>
   <message>
-   <source>Finds features in the photographs and matches them between overlapping ones. The matches that agree with one geometry are kept in features.db, a COLMAP database.</source>
-   <translation>Trouve des détails dans les photographies et les apparie entre celles qui se recouvrent. Les appariements qui s'accordent avec une même géométrie sont gardés dans features.db, une base COLMAP.</translation>
+   <source>Finds features in the photographs and matches them between overlapping ones. What agrees with one geometry is laid on each other to a fraction of a pixel by least-squares matching, and kept in features.db, a COLMAP database.</source>
+   <translation>Cherche des détails dans les photographies et les apparie entre celles qui se recouvrent. Ce qui s'accorde avec une géométrie est superposé à une fraction de pixel par appariement par moindres carrés, et gardé dans features.db, une base de données COLMAP.</translation>
   </message>
   <message>
    <source>Images</source>
@@ -1048,20 +1160,12 @@
    <translation>Les détails les plus forts sont gardés, autant pour chaque photographie ; 0 est sans limite.</translation>
   </message>
   <message>
-   <source>Longest side</source>
-   <translation>Plus grand côté</translation>
-  </message>
-  <message>
-   <source>Photographs are reduced to this many pixels on their longer side before features are sought; 0 is full size.</source>
-   <translation>Les photographies sont réduites à autant de pixels sur leur plus grand côté avant la recherche ; 0 garde leur pleine taille.</translation>
-  </message>
-  <message>
    <source>Pairs</source>
    <translation>Paires</translation>
   </message>
   <message>
-   <source>auto: neighbours by position, or by order and likeness when there are no positions; exhaustive: every pair; sequential: neighbours in the order of the flight.</source>
-   <translation>auto : voisines selon les positions, ou selon l'ordre et la ressemblance quand il n'y a pas de positions ; exhaustive : toutes les paires ; sequential : voisines dans l'ordre du vol.</translation>
+   <source>auto: neighbours by position; without positions every pair of up to 60 photographs, beyond these neighbours in the order of the flight, which ties neighbouring strips in few places. exhaustive: every pair; sequential: neighbours in the order of the flight. Pairs that matched ones point to are added.</source>
+   <translation>auto : les voisines selon la position ; sans positions, toutes les paires jusqu'à 60 photographies, au-delà les voisines dans l'ordre du vol, ce qui lie les bandes voisines en peu d'endroits. exhaustive : toutes les paires ; sequential : les voisines dans l'ordre du vol. Les paires que d'autres appariées désignent sont ajoutées.</translation>
   </message>
   <message>
    <source>Mean features per photograph</source>
