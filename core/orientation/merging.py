@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_LEAST = 10  # points that both models see in one photograph
+_LEAST = 5  # points that both models see in one photograph: refined as they are, each tells the scale to a thousandth
 _SPREAD = 0.1  # robust relative spread of the scale that single points give, beyond which two models do not fit
 
 
