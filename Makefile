@@ -30,6 +30,7 @@ lint: setup ## style, types and spelling
 bench: setup ## speed and memory, beside a peer in the same run
 	@peer=../shared/peers/dsm_sketch_kernels.py; [ -f $$peer ] || peer=; NUMBA_NUM_THREADS=1 $(ENGINE)/python tests/benchmarks/bench_surface.py $$peer
 	@$(ENGINE)/python tests/benchmarks/bench_difference.py
+	@OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(ENGINE)/python tests/benchmarks/bench_features.py
 	@OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(ENGINE)/python tests/benchmarks/bench_matching.py
 	@$(ENGINE)/python tests/benchmarks/bench_enhance.py
 
