@@ -52,8 +52,8 @@ class TiePoints(StepAlgorithm):
             tr("Pairs"),
             tr(
                 "auto: neighbours by position; without positions every pair of up to 60 photographs, beyond these neighbours in "
-                "the order of the flight, which ties neighbouring strips in few places. exhaustive: every pair; sequential: "
-                "neighbours in the order of the flight. Pairs that matched ones point to are added."
+                "the order of the flight and those that look most alike. exhaustive: every pair; sequential: neighbours in the "
+                "order of the flight, which ties neighbouring strips in few places. Pairs that matched ones point to are added."
             ),
             ("auto", "exhaustive", "sequential"),
             default="auto",

@@ -1164,8 +1164,8 @@
    <translation>Paires</translation>
   </message>
   <message>
-   <source>auto: neighbours by position; without positions every pair of up to 60 photographs, beyond these neighbours in the order of the flight, which ties neighbouring strips in few places. exhaustive: every pair; sequential: neighbours in the order of the flight. Pairs that matched ones point to are added.</source>
-   <translation>auto : les voisines selon la position ; sans positions, toutes les paires jusqu'à 60 photographies, au-delà les voisines dans l'ordre du vol, ce qui lie les bandes voisines en peu d'endroits. exhaustive : toutes les paires ; sequential : les voisines dans l'ordre du vol. Les paires que d'autres appariées désignent sont ajoutées.</translation>
+   <source>auto: neighbours by position; without positions every pair of up to 60 photographs, beyond these neighbours in the order of the flight and those that look most alike. exhaustive: every pair; sequential: neighbours in the order of the flight, which ties neighbouring strips in few places. Pairs that matched ones point to are added.</source>
+   <translation>auto : les voisines selon la position ; sans positions, toutes les paires jusqu'à 60 photographies, au-delà les voisines dans l'ordre du vol et celles qui se ressemblent le plus. exhaustive : toutes les paires ; sequential : les voisines dans l'ordre du vol, ce qui lie les bandes voisines en peu d'endroits. Les paires que d'autres appariées désignent sont ajoutées.</translation>
   </message>
   <message>
    <source>Mean features per photograph</source>

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import Literal
 
@@ -21,19 +21,28 @@ Pair = tuple[int, int]
 EXHAUSTIVE = 60  # photographs up to which 'auto' compares all with all when positions are missing
 _NEAREST = 16  # neighbours in plan: two each way along the strip and across, and their diagonals, with some to spare
 _FOLLOWING = 10  # neighbours in the order of flight, when that is all there is to go by
+_BESIDE_ALIKE = 4  # of these where the most alike are found too: a photograph that is blurred or bare is like none
+_ALIKE = 16  # most alike, as many as the nearest in plan
 _ALWAYS = 4  # neighbours that are compared however far they are
 _FOOTPRINTS = 1.5  # farther apart than this many ground widths, two nadir photographs share nothing
 _METRES = 111_320.0  # per degree of latitude
 _OVERLAP = 0.002  # share of a photograph that it must have in common with one found through a third
 
 
-def choose_pairs(photographs: Sequence[Photograph], mode: Literal["auto", "exhaustive", "sequential"]) -> tuple[list[Pair], str]:
+def choose_pairs(
+    photographs: Sequence[Photograph],
+    mode: Literal["auto", "exhaustive", "sequential"],
+    alike: Callable[[set[Pair], int], set[Pair]],
+) -> tuple[list[Pair], str]:
     """Return the pairs to match (indices, the smaller first, sorted) and the rule they were chosen by.
 
     ``auto`` takes the nearest neighbours in plan and the next in the order of flight when at least half of the photographs
     have positions (the others are found by their place in the flight); without positions all pairs of up to 60 photographs,
-    and ``sequential`` beyond. ``sequential`` takes the 10 that follow each one and those 16, 32, 64 ... behind it, which tie
-    neighbouring strips at some places.
+    and beyond the next in the order of flight and the most alike of the others. ``sequential`` takes the 10 that follow each
+    one and those 16, 32, 64 ... behind it, which tie neighbouring strips at some places.
+
+    ``alike(known, n)`` is called only where it is needed: it returns the pairs of each photograph with the ``n`` most like it,
+    not counting those in ``known``.
     """
     count = len(photographs)
     everything = list(combinations(range(count), 2))
@@ -49,6 +58,10 @@ def choose_pairs(photographs: Sequence[Photograph], mode: Literal["auto", "exhau
         return sorted(near), f"the {_NEAREST} nearest in plan and the next two in the order of flight"
     if mode == "auto" and count <= EXHAUSTIVE:
         return everything, "all pairs, as there are no positions to choose by"
+    if mode == "auto":
+        following = followers(order, range(1, _BESIDE_ALIKE + 1))
+        rule = f"the next {_BESIDE_ALIKE} in the order of flight and the {_ALIKE} most alike"
+        return sorted(following | alike(following, _ALIKE)), f"{rule}, as there are no positions to choose by"
     steps = [*range(1, _FOLLOWING + 1), *(2**n for n in range(4, 64) if 2**n < count)]
     return sorted(followers(order, steps)), f"the {_FOLLOWING} that follow in flight, and those 16, 32, 64 ... behind"
 

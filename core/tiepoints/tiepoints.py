@@ -22,6 +22,7 @@ from . import features, matching
 from .database import NAME, provisional_camera, write_database
 from .features import read_features
 from .images import SearchedImage, searched_image
+from .likeness import alike_pairs, largest
 from .matching import PairMatches
 from .pairs import Pair, blocks, choose_pairs, pairs_through_others
 from .refinement import Source, read_refined, refine_keypoints
@@ -190,7 +191,12 @@ def _pairs(
     request: Request, photographs: Sequence[Photograph], found: Sequence[Path], folder: Path, progress: Progress
 ) -> tuple[dict[Pair, PairMatches], str, list[str]]:
     """Return the verified pairs, the rule by which pairs were chosen, and the keys of all files of matches."""
-    chosen, rule = choose_pairs(photographs, request.pairs)
+
+    def alike(known: set[Pair], count: int) -> set[Pair]:
+        descriptors = (largest(read_features(path), (p.width, p.height)) for p, path in zip(photographs, found, strict=True))
+        return alike_pairs(descriptors, known, count, progress.part(0.0, 0.1))
+
+    chosen, rule = choose_pairs(photographs, request.pairs, alike)
     cameras = [encode(provisional_camera(p)) for p in photographs]
 
     def key(i: int, j: int, *more: Any) -> str:
@@ -207,7 +213,7 @@ def _pairs(
         return {pair: m for pair, m in result.items() if len(m.matches)}
 
     first = {(i, j): (key(i, j), None) for i, j in chosen}
-    verified = match(first, progress.part(0.0, 0.9))
+    verified = match(first, progress.part(0.1, 0.9))
     sizes = [(p.width, p.height) for p in photographs]
     through = pairs_through_others({k: (len(m.matches), m.homography) for k, m in verified.items()}, sizes, _TRUSTED)
     second = {(i, j): (key(i, j, h.tolist()), h.tolist()) for i, j, h in through}

@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 from strandline.core.survey import Photograph, Position
-from strandline.core.tiepoints.pairs import blocks, choose_pairs, flight_order, followers, neighbours, pairs_through_others
+from strandline.core.tiepoints.pairs import blocks, flight_order, followers, neighbours, pairs_through_others
+from strandline.core.tiepoints.pairs import choose_pairs as choose_pairs_with
 
 
 def photograph(i, position=None, time=None, **more):
     return Photograph(f"{i:05d}.jpg", 1, "", 4000, 3000, "camera", focal=3000.0, position=position, time=time, **more)
+
+
+def choose_pairs(photographs, mode):
+    """Choose pairs where likeness must not be asked for."""
+    return choose_pairs_with(photographs, mode, lambda known, count: pytest.fail("likeness was asked for"))
 
 
 def flight(strips, length, spacing=8.0, **more):
@@ -66,14 +72,33 @@ def test_a_photograph_without_position_is_found_by_its_place_in_flight():
     assert (30, 41) not in pairs
 
 
-def test_without_positions_all_up_to_sixty_then_sequences():
+def test_without_positions_all_up_to_sixty_then_the_most_alike_beside_the_order_of_flight():
     assert len(choose_pairs([photograph(i) for i in range(60)], "auto")[0]) == 60 * 59 // 2
-    pairs, rule = choose_pairs([photograph(i) for i in range(300)], "auto")
+    asked = []
+
+    def alike(known, count):
+        asked.append((known, count))
+        return {(0, 250), (3, 90)}
+
+    pairs, rule = choose_pairs_with([photograph(i) for i in range(300)], "auto", alike)
+    following = followers(range(300), (1, 2, 3, 4))
+    assert asked == [(following, 16)]
+    assert pairs == sorted({*following, (0, 250), (3, 90)})
+    assert rule == "the next 4 in the order of flight and the 16 most alike, as there are no positions to choose by"
+    assert len(choose_pairs([photograph(i) for i in range(70)], "exhaustive")[0]) == 70 * 69 // 2
+
+
+def test_a_few_positions_are_as_good_as_none():
+    photographs = [*flight(1, 30), *(photograph(i) for i in range(30, 70))]
+    assert (0, 69) in choose_pairs_with(photographs, "auto", lambda known, count: {(0, 69)})[0]
+
+
+def test_a_sequence_ties_neighbouring_strips_at_some_places():
+    pairs, rule = choose_pairs([photograph(i) for i in range(300)], "sequential")
     assert len(pairs) < 300 * 16
     assert (0, 256) in pairs
     assert (0, 11) not in pairs
     assert "flight" in rule
-    assert len(choose_pairs([photograph(i) for i in range(70)], "exhaustive")[0]) == 70 * 69 // 2
 
 
 def test_flight_order_is_by_time_when_all_have_one():
