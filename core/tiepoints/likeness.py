@@ -19,7 +19,7 @@ from ..progress import SILENT, Progress
 from .features import Features, spread
 from .pairs import Pair
 
-_LARGEST = 400  # features of each photograph: 1,000 photographs take 0.25 GB and trees; twice as many find hardly more
+_LARGEST = 400  # features of each photograph: 1,000 photographs take 0.6 GB with the trees; twice as many find hardly more
 _NEAREST = 12  # neighbours of each, some of them in its own photograph
 _KD_TREE = 1  # OpenCV's number of the algorithm
 _TREES = 4  # randomised k-d trees (Silpa-Anan & Hartley 2008)
@@ -53,7 +53,7 @@ def _votes(descriptors: list[NDArray[np.uint8]], progress: Progress) -> csr_arra
     owner = np.repeat(np.arange(len(sizes)), sizes)
     rows, columns, weights = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
     if len(owner):
-        points = np.concatenate(descriptors).astype(np.float32)  # products of whole numbers: exact in any order
+        points = np.concatenate(descriptors, dtype=np.float32)  # products of whole numbers: exact in any order
         # The trees draw at random from OpenCV's own generator.
         cv2.setRNGSeed(1)
         index = cv2.flann.Index(points, {"algorithm": _KD_TREE, "trees": _TREES})

@@ -27,8 +27,9 @@ from strandline.core.survey import Photograph, Position
 from strandline.core.tiepoints.database import provisional_camera, write_database
 from strandline.core.tiepoints.features import Features, detect, spread, write_features
 from strandline.core.tiepoints.images import SearchedImage
+from strandline.core.tiepoints.likeness import alike_pairs, largest
 from strandline.core.tiepoints.matching import PairMatches, match_pair, write_matches
-from strandline.core.tiepoints.pairs import choose_pairs, pairs_through_others
+from strandline.core.tiepoints.pairs import choose_pairs, followers, pairs_through_others
 from strandline.core.tiepoints.refinement import Source, read_refined, refine_keypoints
 from strandline.core.tiepoints.tracks import build_tracks
 
@@ -156,6 +157,15 @@ def on_paper(pairs_per_photograph: float, matches: int) -> tuple[float, float]:
     return seconds, peak_memory() - before
 
 
+def alike(descriptors: list[Any], count: int) -> tuple[float, int]:
+    """Return CPU seconds and number of pairs chosen by likeness among ``count`` photographs, jittered copies."""
+    random = np.random.default_rng(0)
+    copies = [(d + random.normal(0, 20, d.shape)).clip(0, 255).astype(np.uint8) for d in (descriptors * count)[:count]]
+    following = followers(range(count), (1, 2, 3, 4))
+    seconds, pairs = cpu(lambda: alike_pairs(copies, following, 16))
+    return seconds, len(pairs | following)
+
+
 def main() -> None:
     """Print the tables."""
     cv2.setNumThreads(1)
@@ -196,13 +206,18 @@ def main() -> None:
     print(f"\n{'photographs':>12}{'pairs':>8}{'per photograph':>16}{'CPU s to choose':>17}{'second round':>14}{'CPU s':>8}")
     for count in (MANY // 2, MANY, 2 * MANY):
         flight = serpentine(count)
-        seconds, (chosen, _) = cpu(lambda flight=flight: choose_pairs(flight, "auto"))
+        seconds, (chosen, _) = cpu(lambda flight=flight: choose_pairs(flight, "auto", lambda known, n: set()))
         known = homographies(flight, chosen)
         sizes = [(p.width, p.height) for p in flight]
         again, more = cpu(lambda known=known, sizes=sizes: pairs_through_others(known, sizes, 50))
         print(f"{count:12}{len(chosen):8}{len(chosen) / count:16.2f}{seconds:17.2f}{len(more):14}{again:8.2f}")
         if count == MANY:
             total = len(chosen) + len(more)
+    print(f"\n{'photographs':>12}{'pairs':>8}{'per photograph':>16}{'CPU s to choose':>17}  without positions")
+    size = photographs[0].width, photographs[0].height
+    for count in (MANY // 4, MANY // 2, MANY):
+        seconds, number = alike([largest(f, size) for f in features], count)
+        print(f"{count:12}{number:8}{number / count:16.2f}{seconds:17.2f}")
     seconds, memory = on_paper(total / MANY, round(verified))
     print(f"\n{MANY} photographs of {COUNT} features, {total} pairs, from these parts:")
     print(f"  matching    {total * per_pair / 3600:6.2f} h of CPU")
