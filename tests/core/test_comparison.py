@@ -192,6 +192,7 @@ def request_for(flight, **more):
         "sigma_h_field": "sigma_h",
         "sigma_v_field": "sigma_v",
         "marks": VectorSource(str(flight / "marks.csv"), "marks"),
+        "method": "arctan",
         "workers": 1,
     }
     return compareinputs.Request(**{**given, **more})

@@ -145,7 +145,7 @@ def test_other_parameters_replace_only_when_complete(folder):
     survey, listener = enhance(folder, window=21)
     assert "2 of 3 images stand already." in listener.told
     assert contents(survey) != before
-    assert [p.name for p in (folder / "enhanced").iterdir()] == ["arctan-21"]
+    assert [p.name for p in (folder / "enhanced").iterdir()] == ["bandpass-21"]
 
 
 def test_a_killed_run_resumes(tmp_path):
