@@ -22,12 +22,14 @@ COLUMNS = ("features", "oriented", "mtp", "mtp_percent", "mmtp", "mmtp_percent",
 ERRORS = ("plani", "alti", "plani_check", "alti_check")
 
 
-def compared(folder: Path, contrast: float, threshold: Any, seed: int) -> list[dict[str, Any]]:
-    """Return the rows of the comparison of a simulated beach."""
+def compared(
+    folder: Path, contrast: float, threshold: Any, seed: int, size: tuple[float, float] = (50, 58)
+) -> list[dict[str, Any]]:
+    """Return the rows of the comparison of a simulated beach of ``size`` (length, width; m)."""
     flight = folder / f"beach-{contrast:g}-{seed}"
     simulatesurvey.run(
         simulatesurvey.Request(
-            str(flight), dates="one", length=50, width=58, height=48, camera_width=1800, camera_height=1350, focal=1650,
+            str(flight), dates="one", length=size[0], width=size[1], height=48, camera_width=1800, camera_height=1350, focal=1650,
             contrast=contrast, tilt=2, gcp_count=5, check_count=12, seed=seed,
         )
     )  # fmt: skip
