@@ -103,7 +103,6 @@ def map_photographs(
         with quiet():
             models = pycolmap.incremental_mapping(copy, folder, folder, options, next_image_callback=count)
             if not models:  # a pair alone, or photographs that are all close together
-                options.triangulation.ignore_two_view_tracks = False
                 options.mapper.init_min_tri_angle = _NARROW
                 options.mapper.init_min_num_inliers = 25
                 models = pycolmap.incremental_mapping(copy, folder, folder, options, next_image_callback=count)
@@ -187,6 +186,8 @@ def _incremental_options(network: Network, given: Mapping[int, Camera]) -> pycol
     options.mapper.filter_min_tri_angle = _ANGLE
     options.mapper.num_threads, options.mapper.random_seed = 1, SEED
     options.triangulation.random_seed = SEED
+    # Where two photographs alone join two parts of a block, their points of two rays hold the pose of the one behind.
+    options.triangulation.ignore_two_view_tracks = False
     # A photograph that sees too few points of the model is joined by its matches with several photographs of it, if it can be;
     # the final adjustment takes out what three rays do not hold.
     options.structure_less_registration_fallback = True

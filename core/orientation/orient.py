@@ -31,7 +31,7 @@ from .orientreport import Orientation, write_report
 from .pointcloud import write_points
 from .sparse import block_from_model
 
-VERSION = 3  # raise it when the same input would give another result
+VERSION = 4  # raise it when the same input would give another result
 _WEAK_LINK = 100  # points of three or more rays below which a link between two parts of the block is told of
 _MULTI = 10  # observations of points with three or more rays below which a photograph's pose is not believed
 

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from .features import spread
 from .pairs import Pair
 
-_KEEP_WHOLE = 200  # matches up to which a pair keeps them all: it may be the only tie between two parts of the block
+_KEPT = 200  # matches that every pair keeps, those of its longest tracks, or all it has
 
 
 def thinned(
@@ -35,9 +35,14 @@ def thinned(
         tied = np.flatnonzero(length[mine] > 1)
         best = spread(points[tied], length[mine[tied]].astype(np.float32), sizes[i], count)
         chosen[mine[tied[best]]] = True
+    for (i, _), matches in pairs.items():
+        # Where a few photographs alone join two parts of the block, their small common corner must not be thinned out.
+        mine = track[matches[:, 0] + starts[i]]
+        if chosen[mine].sum() < _KEPT:
+            chosen[mine[np.argsort(-length[mine], kind="stable")[:_KEPT]]] = True
     result = {}
     for (i, j), matches in pairs.items():
-        keep = chosen[track[matches[:, 0] + starts[i]]] | (len(matches) <= _KEEP_WHOLE)
+        keep = chosen[track[matches[:, 0] + starts[i]]]
         if keep.any():
             result[i, j] = matches[keep]
     return result

@@ -90,6 +90,7 @@ def test_what_is_not_given_is_null_and_defaults_are_sent(sent, survey):
         "source": "auto",
         "max_features": 20000,
         "max_size": 0,
+        "threshold": "noise",
         "pairs": "auto",
         "workers": 0,
         "scheduler": None,
