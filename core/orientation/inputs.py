@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 
 from ..block import Block
 from ..errors import InputError
@@ -34,6 +35,7 @@ class Inputs:
     heights: HeightPlan
     focal_change: float
     warnings: tuple[str, ...]
+    ignore: shapely.Geometry | None = None
 
 
 def read_given(request: Request) -> Given | None:
@@ -93,10 +95,8 @@ def gather(request: Request, survey: Survey, given: Given | None, block: Block) 
             "GNSS and GCP heights are of different kinds and there is no GEOID: GNSS heights are used for differences only, and "
             "ALTI_GNSS is not determined."
         )
-    if request.ignore is not None:
-        polygons(request.ignore, crs)
-        warnings.append("IGNORE has no effect on a similarity, which uses no tie points.")
-    return Inputs(crs, control, gnss, plan, _focal_change(survey, block), tuple(warnings))
+    ignore = shapely.union_all(polygons(request.ignore, crs)) if request.ignore is not None else None
+    return Inputs(crs, control, gnss, plan, _focal_change(survey, block), tuple(warnings), ignore)
 
 
 def _focal_change(survey: Survey, block: Block) -> float:
