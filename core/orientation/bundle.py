@@ -102,8 +102,8 @@ def rotations(vectors: Array) -> Array:
 def project(point, rotation, centre, brown, xy, by_point, by_pose, by_brown):  # type: ignore[no-untyped-def]
     """Write the pixel (2,) of ``point`` (3,) and its derivatives; tell whether the camera can see it.
 
-    Derivatives are by point (2, 3), pose (2, 6) and the twelve interior parameters (2, 12). A point behind the camera, or beyond the
-    radius from which the distortion folds back, cannot be seen.
+    Derivatives are by point (2, 3), pose (2, 6) and the twelve interior parameters (2, 12). A point behind the camera, or beyond
+    the radius from which the distortion folds back, cannot be seen.
     """
     d = point - centre
     x = rotation[0, 0] * d[0] + rotation[0, 1] * d[1] + rotation[0, 2] * d[2]

@@ -79,12 +79,10 @@ def _rescale(found: Sequence[Test], factors: dict[Part, float], *, declared: boo
         values = [t.statistic / stats.chi2.ppf(0.5, len(t.error)) for t in found if t.part == part]
         if len(values) < _FEW and not (ground and part in ("plan", "height") and values):
             continue
-        factor = float(np.median(values))
-        least = 1.0 + 4.0 / np.sqrt(len(values))  # beyond what chance does to the median
-        new = factors[part] * factor
-        if upward and factor < least and new >= 1.0:
-            continue
-        new = max(new, 1.0) if upward else max(new, 1e-6)
+        new = factors[part] * float(np.median(values))
+        if upward and new < 1.0 + 4.0 / np.sqrt(len(values)):  # what chance does to the median
+            new = 1.0
+        new = max(new, 1e-6)
         if max(new / factors[part], factors[part] / new) > _SETTLED:
             factors[part], changed = new, True
     return changed
