@@ -150,7 +150,7 @@ def _control(request: Request) -> georeference.Request | None:
     """Return what georeferencing is to be asked in each case, None without ground control."""
     shared = {f.name for f in fields(georeference.Request)} & {f.name for f in fields(Request)}
     given = {key: getattr(request, key) for key in shared - {"method", "output_html_file"}}
-    control = georeference.Request("", **given)
+    control = georeference.Request("", method="similarity", **given)  # as in the paper: it changes no shape
     georeference.check_parameters(control)
     if request.gcps is None and request.gcp_file is None:
         if request.marks_raw is not None:

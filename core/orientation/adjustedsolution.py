@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,7 @@ Array = NDArray[np.float64]
 
 _TIE_SAMPLE = 2000  # tie points whose own sigma is computed
 _HOLDS_HEIGHT = 0.01  # m, and twice what positions alone would give: what must be told of heights without control
+_ALIKE = 3.0  # tie points that count as one: what is told of
 _ENLARGED = 9.0  # variance factor of ground points that is told of
 
 
@@ -62,7 +62,9 @@ def solve_adjustment(
     positions = _positions(gnss, frame, with_control=bool(control), comparable=comparable)
     network = network_of(assembly, start.similarity, interiors, usable)
     sigma = float(np.median(assembly.block.errors)) if len(assembly.block.errors) else 1.0
-    settled = settle(network, control, positions, declared=gnss.declared, sigma=sigma, told=step)
+    settled = settle(
+        network, control, positions, declared=gnss.declared, sigma=sigma, scatter=start.estimated_factor or 1.0, told=step
+    )
     adjusted = settled.adjusted
     block, kept = adjusted_block(assembly, start.similarity, adjusted.cameras, usable)
     errors, own, total = _errors(adjusted, seen, sightings, members, frame)
@@ -97,8 +99,9 @@ def solve_adjustment(
         pixel_sigma=adjusted.sigma,
         centre_sigma=_centre_sigma(adjusted),
         tie_sigma=_tie_sigma(adjusted),
+        predicted=_predicted(seen, total),
         alternatives=tuple(
-            alternatives(settled, start, gnss, frame, sightings, comparable=comparable, step=step) if compare else ()
+            alternatives(settled, assembly.block, start, gnss, sightings, comparable=comparable, step=step) if compare else ()
         ),
     )
 
@@ -148,6 +151,13 @@ def _errors(
         total[i] = covariance + surveyed
         own[i] = np.sqrt(np.diag(adjusted.intersect(sighting, nothing)[1] + surveyed))
     return errors, own, total
+
+
+def _predicted(seen: Sequence[Seen], total: Array) -> Array:
+    """Return the sigmas (n, 3) of check points' errors; a control point's residual has another one."""
+    check = np.array([s.point.check for s in seen], bool)
+    sigmas = np.sqrt(np.diagonal(total, axis1=1, axis2=2)).reshape(-1, 3)
+    return np.where(check[:, None], sigmas, np.nan)
 
 
 def _leave_one_out(adjusted: Adjusted, seen: Sequence[Seen], members: Sequence[int], frame: LocalFrame) -> tuple[Array, Array]:
@@ -230,6 +240,12 @@ def _cameras(
 
 def _weight_notes(settled: Weighted, gnss: Gnss, with_control: bool) -> list[str]:
     notes, factors = [], settled.factors
+    effect = settled.adjusted.effect
+    if effect > _ALIKE:
+        notes.append(
+            f"Residuals of neighbouring tie points are alike, as a rolling shutter or a lens beyond its model makes them: "
+            f"{effect:.0f} of them count as one, and what is known beforehand of the camera weighs more."
+        )
     worst = max(factors["plan"], factors["height"])
     if worst > _ENLARGED:
         notes.append(
@@ -280,8 +296,3 @@ def _tie_sigma(adjusted: Adjusted) -> Array:
         total = np.einsum("saj,jk,sak->sa", follows, adjusted.cofactor, follows, optimize=True)
         variances.append(total + np.diagonal(held, axis1=1, axis2=2))
     return np.asarray(np.sqrt(np.nanmedian(np.concatenate(variances), axis=0)))
-
-
-def with_notes(solution: Solution, notes: Sequence[str]) -> Solution:
-    """Return the solution with further notes."""
-    return replace(solution, notes=(*solution.notes, *notes))

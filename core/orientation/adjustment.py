@@ -19,6 +19,7 @@ from ..errors import NotEnoughData
 from . import bundle
 from .bundle import POSE, Cameras, Rays
 from .gnss import offsets
+from .independence import design_effect
 from .interior import Interior
 
 Array = NDArray[np.float64]
@@ -27,6 +28,9 @@ _ROUNDS = 40
 _WEIGHING = 6  # rounds after which the tie points' weights and sigma stand, so that the rest can settle
 _STILL = 1e-6  # m, and px at the image's edge: a change below which the adjustment stands
 _HUBER = 2.5  # sigmas of a tie point's 2D residual, or of a position's, beyond which it weighs less (Huber 1964)
+_HALVINGS = 8  # of a step that overshoots
+_GAIN = 1e-6  # of the sum of squares in sigmas: below, no unknown moves by more than a thousandth of its own
+_NOISE = 1e-10  # of the cost: what rounding may add
 _LEAST_SIGMA = 1e-4  # px; keeps exact observations solvable
 
 
@@ -92,6 +96,7 @@ class Adjusted:
     places: Array
     bias: Array
     sigma: float
+    effect: float
     weight: Array
     cofactor: Array
 
@@ -99,6 +104,11 @@ class Adjusted:
     def cameras(self) -> Cameras:
         """The adjusted cameras."""
         return self.network.cameras
+
+    def design_effect(self) -> float:
+        """Return how much the tie points overstate themselves, by their residuals."""
+        ties = self.network.ties
+        return design_effect(_tie_residuals(self.network), self.weight * self.sigma**2 * self.effect, ties.view, ties.xy)
 
     def position_residuals(self) -> Array:
         """Return antennas as given minus computed (g, 3), without the common error."""
@@ -139,47 +149,70 @@ class Adjusted:
 
 
 def adjust(
-    network: Network, control: Sequence[Control], positions: Positions, *, sigma: float, fixed_sigma: bool = False
+    network: Network,
+    control: Sequence[Control],
+    positions: Positions,
+    *,
+    sigma: float,
+    fixed_sigma: bool = False,
+    effect: float = 1.0,
 ) -> Adjusted:
-    """Adjust by Gauss-Newton with Huber's weights on tie points and positions.
+    """Adjust by Gauss-Newton, with steps halved that overshoot, and Huber's weights on tie points and positions.
 
-    ``sigma`` (px) is that of tie points to start with; the residuals tell it, unless it is ``fixed_sigma``.
+    ``sigma`` (px) is that of tie points to start with; the residuals tell it, unless it is ``fixed_sigma``. ``effect`` is by how
+    much they overstate themselves (see ``independence``): so many of them count as one.
 
     Raises
     ------
     NotEnoughData
         When the observations do not determine the unknowns, or the adjustment does not settle.
     """
-    places = np.array([c.ground for c in control]).reshape(-1, 3)
-    bias = np.zeros(3)
-    before = np.inf
-    damping = 0.0
-    weight = _tie_weights(network, sigma)
-    for i in range(_ROUNDS):
-        system = _system(network, control, positions, places, bias, weight)
-        change = _solve(system.matrix, system.side, damping)
-        cameras = network.cameras.moved(change[: network.cameras.columns])
-        points = _followed(network, weight, change)
-        places = _follow_control(control, network.cameras, places, change)
-        if len(change) > network.cameras.columns:
-            bias = bias + change[-3:]
-        step = _size(network, change)
-        damping = 0.0 if step < before else max(10 * damping, 1e-3)  # a step that grows overshoots
-        before = step
-        network = replace(network, cameras=cameras, points=points)
-        if i < _WEIGHING:
+    state = _State(network, np.array([c.ground for c in control]).reshape(-1, 3), np.zeros(3))
+    weights = _weights(state, positions, sigma, effect)
+    cost, weighed = _cost(state, control, positions, weights), 0
+    for _ in range(_ROUNDS):
+        system = _system(state, control, positions, weights)
+        change = _solve(system.matrix, system.side)
+        for _ in range(_HALVINGS):
+            tried = _moved(state, control, weights, change)
+            trial = _cost(tried, control, positions, weights)
+            if trial <= cost * (1 + _NOISE):
+                break
+            change = change / 2
+        gain, step = cost - trial, _size(network, change)
+        state, cost = tried, trial
+        if weighed < _WEIGHING:
+            weighed += 1
             if not fixed_sigma:
-                sigma = _tie_sigma(system.residuals, weight * sigma**2, network)
-            weight = _tie_weights(network, sigma)
-        elif step < _STILL:
+                sigma = _tie_sigma(system.residuals, weights.tie * sigma**2 * effect, network)
+            weights = _weights(state, positions, sigma, effect)
+            cost = _cost(state, control, positions, weights)
+        elif step < _STILL or gain < _GAIN:
             break
     else:
         raise NotEnoughData(
             "The adjustment does not settle: tie points, ground points and positions contradict each other; look at the "
             "residuals of METHOD=similarity."
         )
-    inverse = _inverse(_system(network, control, positions, places, bias, weight).matrix)
-    return Adjusted(network, tuple(control), positions, places, bias, sigma, weight, inverse)
+    inverse = _inverse(_system(state, control, positions, weights).matrix)
+    return Adjusted(state.network, tuple(control), positions, state.places, state.bias, sigma, effect, weights.tie, inverse)
+
+
+@dataclass(frozen=True)
+class _State:
+    """What is adjusted: the network, the control points' places (k, 3), and the positions' common error (3,)."""
+
+    network: Network
+    places: Array
+    bias: Array
+
+
+@dataclass(frozen=True)
+class _Weights:
+    """Of the tie points' rays (m,) and of positions (g, 3); they stand while steps are tried."""
+
+    tie: Array
+    position: Array
 
 
 @dataclass(frozen=True)
@@ -189,13 +222,45 @@ class _System:
     residuals: Array
 
 
-def _system(
-    network: Network, control: Sequence[Control], positions: Positions, places: Array, bias: Array, weight: Array
-) -> _System:
+def _weights(state: _State, positions: Positions, sigma: float, effect: float) -> _Weights:
+    left = positions.antenna - _antennas(state.network.cameras, positions) - state.bias
+    return _Weights(_tie_weights(state.network, sigma) / effect, position_weights(left, positions.sigma))
+
+
+def _moved(state: _State, control: Sequence[Control], weights: _Weights, change: Array) -> _State:
+    network = state.network
+    cameras = network.cameras.moved(change[: network.cameras.columns])
+    places = _follow_control(control, network.cameras, state.places, change)
+    bias = state.bias + change[-3:] if len(change) > network.cameras.columns else state.bias
+    return _State(replace(network, cameras=cameras, points=_followed(network, cameras, weights.tie, change)), places, bias)
+
+
+def _cost(state: _State, control: Sequence[Control], positions: Positions, weights: _Weights) -> float:
+    """Return the sum of weighted squares; infinite when a ray that could be seen no longer can."""
+    network, cameras = state.network, state.network.cameras
+    tie = _tie_residuals(network)
+    total = float(np.sum(np.where(weights.tie > 0, weights.tie * np.sum(tie**2, axis=1), 0.0)))
+    for c, interior in enumerate(network.interiors):
+        off = interior.known - interior.values(cameras.brown[c])
+        total += float(off @ interior.information @ off)
+    if len(positions):
+        left = positions.antenna - _antennas(cameras, positions) - state.bias
+        total += float(np.sum(weights.position * left**2))
+        if (positions.shared > 0).any():
+            total += float(np.sum((state.bias / np.where(positions.shared > 0, positions.shared, _LEAST_SIGMA)) ** 2))
+    for one, place in zip(control, state.places, strict=True):
+        left = rows(cameras, one.sighting, place, cameras.columns)[2]
+        off = one.ground - place
+        total += float(np.sum((left / np.repeat(one.sighting.sigma, 2)) ** 2) + off @ np.linalg.solve(one.covariance, off))
+    return total if np.isfinite(total) else np.inf
+
+
+def _system(state: _State, control: Sequence[Control], positions: Positions, weights: _Weights) -> _System:
+    network, bias = state.network, state.bias
     c, t = network.cameras, network.ties
     columns = c.columns
     matrix, side, residuals = bundle.reduce(
-        t.start, t.view, t.xy, weight, network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free,
+        t.start, t.view, t.xy, weights.tie, network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free,
         c.interior_column, columns,
     )  # fmt: skip
     matrix = np.triu(matrix) + np.triu(matrix, 1).T
@@ -211,8 +276,8 @@ def _system(
         matrix[range(columns, size), range(columns, size)] += 1.0 / common**2
         side[columns:] -= bias / common**2
     if len(positions):
-        _add_positions(matrix, side, c, positions, bias, with_bias)
-    for one, place in zip(control, places, strict=True):
+        _add_positions(matrix, side, c, positions, bias, weights.position)
+    for one, place in zip(control, state.places, strict=True):
         jacobian, by_point, left = rows(c, one.sighting, place, size)
         effective = left - by_point @ (one.ground - place)
         spread = np.diag(np.repeat(one.sighting.sigma**2, 2)) + by_point @ one.covariance @ by_point.T
@@ -223,9 +288,9 @@ def _system(
     return _System(matrix, side, residuals)
 
 
-def _add_positions(matrix: Array, side: Array, cameras: Cameras, positions: Positions, bias: Array, with_bias: bool) -> None:
+def _add_positions(matrix: Array, side: Array, cameras: Cameras, positions: Positions, bias: Array, weight: Array) -> None:
+    with_bias = len(side) > cameras.columns
     left = positions.antenna - _antennas(cameras, positions) - bias
-    weight = position_weights(left, positions.sigma)
     for view, w, r in zip(positions.view, weight, left, strict=True):
         own = np.arange(POSE * view + 3, POSE * view + 6)
         matrix[own, own] += w
@@ -300,12 +365,29 @@ def _straight(cameras: Cameras, sighting: Sighting) -> Array:
     return np.asarray(np.linalg.solve(system, np.einsum("nij,nj->i", across, cameras.centre[sighting.view])))
 
 
-def _tie_weights(network: Network, sigma: float) -> Array:
+def _tie_residuals(network: Network) -> Array:
+    """Return observed minus computed (m, 2) of the tie points' rays, NaN where a point cannot be seen."""
     c, t = network.cameras, network.ties
-    _, residuals = bundle.intersect(
-        t.start, t.view, t.xy, np.ones(len(t.view)), network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free, 0
+    return np.asarray(
+        bundle.intersect(
+            t.start,
+            t.view,
+            t.xy,
+            np.ones(len(t.view)),
+            network.points,
+            c.rotation,
+            c.centre,
+            c.camera,
+            c.brown,
+            c.basis,
+            c.free,
+            0,
+        )[1]
     )
-    length = np.hypot(*residuals.T) / sigma
+
+
+def _tie_weights(network: Network, sigma: float) -> Array:
+    length = np.hypot(*_tie_residuals(network).T) / sigma
     weight = np.minimum(1.0, _HUBER / np.maximum(np.where(np.isfinite(length), length, np.inf), 1e-12)) / sigma**2
     return np.asarray(weight)
 
@@ -320,13 +402,17 @@ def _tie_sigma(residuals: Array, shrink: Array, network: Network) -> float:
     return max(float(np.sqrt(np.sum(shrink[good] * np.sum(residuals[good] ** 2, axis=1)) / redundancy)), _LEAST_SIGMA)
 
 
-def _followed(network: Network, weight: Array, change: Array) -> Array:
+def _followed(network: Network, moved: Cameras, weight: Array, change: Array) -> Array:
+    """Return the points after the change: by the linear equations, then to where their rays meet, which long steps miss."""
     c, t = network.cameras, network.ties
+    points = bundle.follow(
+        t.start, t.view, t.xy, weight, network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free,
+        c.interior_column, change,
+    )  # fmt: skip
     return np.asarray(
-        bundle.follow(
-            t.start, t.view, t.xy, weight, network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free,
-            c.interior_column, change,
-        )
+        bundle.intersect(
+            t.start, t.view, t.xy, weight, points, moved.rotation, moved.centre, moved.camera, moved.brown, moved.basis,
+            moved.free, 1 )[0]
     )  # fmt: skip
 
 
@@ -347,11 +433,9 @@ def _size(network: Network, change: Array) -> float:
     return float(max(np.abs(poses[:, 3:]).max(), focal * np.abs(poses[:, :3]).max()))
 
 
-def _solve(matrix: Array, side: Array, damping: float) -> Array:
+def _solve(matrix: Array, side: Array) -> Array:
     scale = _scale(matrix)
     scaled = matrix * scale * scale[:, None]
-    if damping:
-        scaled[np.diag_indices_from(scaled)] += damping
     try:
         return np.asarray(scale * cho_solve(cho_factor(scaled, overwrite_a=True, check_finite=False), scale * side))
     except LinAlgError as error:

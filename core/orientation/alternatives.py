@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..block import Block
 from ..errors import NotEnoughData
 from ..frames import LocalFrame
 from .accuracy import alti, plani
 from .adjustment import Adjusted, Sighting, adjust
 from .gnss import SHARED, Gnss
-from .observations import Seen
+from .observations import Seen, Solver, undetermined
 from .solution import Alternative, Solution
 from .weighting import Weighted
 
@@ -24,9 +25,9 @@ _COUNTS = (0, 1, 3, 5)
 
 def alternatives(
     settled: Weighted,
+    block: Block,
     solution: Solution,
     gnss: Gnss,
-    frame: LocalFrame,
     sightings: Sequence[Sighting],
     *,
     comparable: bool,
@@ -45,7 +46,9 @@ def alternatives(
         return []
     order = _spread(np.array([c.ground for c in adjusted.control]).reshape(-1, 3))
     counts = [n for n in _COUNTS if n < len(order)] + [len(order)]
-    found = []
+    choices = [[adjusted.control[k].sighting.name for k in order[:count]] for count in counts]
+    found = list(_similarities(block, solution, gnss, choices, checks))
+    frame = solution.frame
     for count in counts:
         step()
         control = [adjusted.control[k] for k in order[:count]]
@@ -56,13 +59,36 @@ def alternatives(
             alone = np.zeros(3) if gnss.declared else np.array([SHARED[0], SHARED[0], SHARED[1]])
             positions = replace(positions, shared=alone)
         try:
-            other = adjust(adjusted.network, control, positions, sigma=adjusted.sigma, fixed_sigma=True)
+            other = adjust(adjusted.network, control, positions, sigma=adjusted.sigma, fixed_sigma=True, effect=adjusted.effect)
         except NotEnoughData:
             continue
         names = tuple(c.sighting.name for c in control)
         numbers = _judged(other, seen, judged, sightings, frame, errors=bool(checks))
         found.append(Alternative("adjustment", count, names, *numbers))
     return found
+
+
+def _similarities(
+    block: Block, solution: Solution, gnss: Gnss, choices: Sequence[Sequence[str]], checks: Sequence[int]
+) -> Iterator[Alternative]:
+    """Yield the similarity on each choice of control points, on GNSS too where these are fewer than three."""
+    for names in choices:
+        solver = Solver(block, solution.seen, gnss, solution.frame)
+        solver.with_gnss = len(names) < 3
+        if solver.with_gnss and not len(gnss):
+            continue
+        used = np.array([s.point.name in names and not s.point.check for s in solution.seen], bool)
+        try:
+            solved = solver.fit(used)
+        except NotEnoughData:
+            continue
+        if undetermined(solved, "-"):
+            continue
+        errors = solver.errors(solved)[list(checks)]
+        predicted = [np.sqrt(np.diag(solver.predicted(solved, i))) for i in checks]
+        numbers = [plani(errors), alti(errors)] if checks else [None, None]
+        numbers += [plani(np.array(predicted)), alti(np.array(predicted))] if checks else [None, None]
+        yield Alternative("similarity", len(names), tuple(names), *numbers)
 
 
 def _judged(

@@ -74,7 +74,8 @@ def findings(solution: Solution, inputs: Inputs, dome: Doming | None) -> list[st
             told.append(f"The rays to {name} meet at {degrees:.1f} degrees only, which leaves its height uncertain.")
     told += _factor_sentences(solution)
     middle, edge = predicted(solution)
-    told += _height_sentence(solution, middle[1], edge[1])
+    if inputs.gnss.declared:
+        told += _height_sentence(solution, middle[1], edge[1])
     matters = _EDGE_MATTERS * ground_pixel(solution.block)
     if any(e > max(_EDGE_WARNING * m, matters) for m, e in zip(middle, edge, strict=True)):
         told.append(

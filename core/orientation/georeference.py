@@ -190,7 +190,7 @@ def _fingerprint(request: Request, inputs: Inputs, oriented: str) -> str:
         for p in inputs.control.points
     ]
     positions = [a.tolist() for a in (inputs.gnss.view, inputs.gnss.coordinates, inputs.gnss.sigmas, inputs.gnss.lever)]
-    ignored = None if inputs.ignore is None else inputs.ignore.wkb
+    ignored = None if inputs.ignore is None else inputs.ignore.wkb_hex
     return digest(VERSION, oriented, request.method, request.sigma_mark, inputs.crs, points, positions, inputs.heights, ignored)
 
 

@@ -42,6 +42,7 @@ def report(solution: Solution, inputs: Inputs, result: Result, dome: Doming | No
         [
             ["control points, residuals", result.control_count, result.plani_control, result.alti_control],
             ["check points", result.check_count, result.plani_check, result.alti_check],
+            ["  as predicted for these", _known(solution.predicted), *_rms_sigma(solution.predicted)],
             ["control points, each left out", _count(solution.loo), result.plani_loo, result.alti_loo],
             ["  as predicted for these", _count(solution.loo), *_rms_sigma(solution.loo_sigma)],
             ["GNSS positions", len(solution.gnss_errors), result.plani_gnss, result.alti_gnss],
@@ -229,7 +230,13 @@ def _basis(solution: Solution, inputs: Inputs) -> str:
     return f"{based} Heights are {inputs.heights.kind}. Scale {solution.similarity.scale:.6g} m per unit of the free frame."
 
 
-def _rms_sigma(sigmas: Array) -> tuple[float | None, float | None]:
+def _known(sigmas: Array | None) -> int:
+    return 0 if sigmas is None else _count(sigmas)
+
+
+def _rms_sigma(sigmas: Array | None) -> tuple[float | None, float | None]:
+    if sigmas is None:
+        return None, None
     good = sigmas[np.isfinite(sigmas[:, 0])]
     if not len(good):
         return None, None

@@ -87,7 +87,7 @@ def calibrated(camera: Camera, calibration: Camera, covariance: Array | None = N
     sigmas = {**_KEPT, "cx": _KEPT_CENTRE * side, "cy": _KEPT_CENTRE * side}
     information = _information(names, prior, sigmas)
     if covariance is not None and covariance.shape == information.shape:
-        information = np.linalg.inv(np.linalg.inv(information) + covariance)
+        information = np.asarray(np.linalg.inv(np.linalg.inv(information) + covariance), float)
     return Interior(names, basis, known, information, "calibration")
 
 
@@ -103,7 +103,8 @@ def told(label: str, interior: Interior, covariance: Array, values: Array) -> li
     """
     sigma, before = np.sqrt(np.diag(covariance)), interior.sigma
     sentences = []
-    rests = [n for n, s, b in zip(interior.names, sigma, before, strict=True) if s > _RESTS * b]
+    off = np.abs(values - interior.known) > 3 * before
+    rests = [n for n, s, b, o in zip(interior.names, sigma, before, off, strict=True) if s > _RESTS * b and not o]
     if rests and interior.origin != "calibration":
         sentences.append(
             f"The block does not determine {', '.join(rests)} of {label}: {'it stays' if len(rests) == 1 else 'they stay'} at "
@@ -122,7 +123,6 @@ def told(label: str, interior: Interior, covariance: Array, values: Array) -> li
             f"In {label} the adjustment can hardly tell {', '.join(strong)} apart: fly cross strips, or use a simpler "
             "CAMERA_MODEL."
         )
-    off = np.abs(values - interior.known) > 3 * before
     if off.any():
         wrong = [
             f"{n} ({v:.5g} for {k:.5g})"

@@ -59,7 +59,7 @@ class Test:
 
 def tests(adjusted: Adjusted) -> list[Test]:
     """Return the tests of all marks, control points and positions whose errors would show."""
-    found = []
+    found: list[Test] = []
     for index, one in enumerate(adjusted.control):
         found += _control_tests(adjusted, index, one)
     if len(adjusted.positions):
@@ -116,7 +116,7 @@ def _test(part: Part, index: int, item: int, enters: Array, weighted: Array, aft
     if redundancy < _UNCONTROLLED * len(own):
         return
     u = enters.T @ weighted
-    error = np.linalg.solve(normal, u)
+    error = np.asarray(np.linalg.solve(normal, u), float)
     yield Test(part, index, item, error, float(u @ error), redundancy)
 
 

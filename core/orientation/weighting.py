@@ -21,8 +21,10 @@ Array = NDArray[np.float64]
 
 FALSE_ALARM = 0.01  # chance of naming anything at all when nothing is wrong
 _ROUNDS = 60
+_BOWL = 100.0
 _FEW = 6  # tests from which a group's own scatter is told
-_SETTLED = 1.15  # factor of a variance below which it stands
+_SETTLED = 1.15  # times the factor of a variance, or less: it stands
+_YIELD = 1.08  # by which that grows each round, so that groups that share an error do not hand it to and fro for ever
 
 
 @dataclass(frozen=True)
@@ -41,23 +43,34 @@ def settle(
     *,
     declared: bool,
     sigma: float,
+    scatter: float = 1.0,
     told: Callable[[], None] = lambda: None,
 ) -> Weighted:
     """Adjust until nothing stands out; ``declared`` tells whether the positions' sigmas are given or only their ratio is.
 
+    ``scatter`` is a variance factor of the control points to begin with. Beyond what a bowl of the free block explains, it says
+    that their sigmas are far too small, which would bend the block past where equations are linear.
     ``told`` is called before each adjustment, for progress and cancelling.
     """
     given, given_positions = tuple(control), positions
     factors: dict[Part, float] = dict.fromkeys(("mark", "plan", "height", "GNSS plan", "GNSS height"), 1.0)
     named: list[Test] = []
-    enlarged = False
-    for _ in range(_ROUNDS):
+    effect = 1.0
+    enlarged = scatter > _BOWL
+    if enlarged:
+        factors["plan"] = factors["height"] = scatter
+    for round_ in range(_ROUNDS):
         told()
-        adjusted = adjust(network, _control(given, named, factors), _positions(given_positions, named, factors), sigma=sigma)
+        weighted = _control(given, named, factors), _positions(given_positions, named, factors)
+        adjusted = adjust(network, *weighted, sigma=sigma, effect=effect)
         network, sigma = adjusted.network, adjusted.sigma
+        told_by_residuals, settled = adjusted.design_effect(), _SETTLED * _YIELD**round_
+        if max(told_by_residuals / effect, effect / told_by_residuals) > settled:
+            effect = told_by_residuals
+            continue
         done = {(t.part, t.index, t.item) for t in named}
         found = [t for t in tests(adjusted) if (t.part, t.index, t.item) not in done]
-        if _rescale(found, factors, declared=declared, ground=enlarged):
+        if _rescale(found, factors, declared=declared, ground=enlarged, settled=settled):
             continue  # what only seemed wrong by sigmas that were too small is none
         worst = min(found, key=lambda t: t.chance, default=None)
         if worst is None or worst.chance * len(found) > FALSE_ALARM:
@@ -69,7 +82,7 @@ def settle(
     return Weighted(adjusted, tuple(named), factors)
 
 
-def _rescale(found: Sequence[Test], factors: dict[Part, float], *, declared: bool, ground: bool) -> bool:
+def _rescale(found: Sequence[Test], factors: dict[Part, float], *, declared: bool, ground: bool, settled: float) -> bool:
     """Bring the variance factors of groups to what their tests say; tell whether one changed."""
     changed = False
     groups: list[tuple[Part, bool]] = [("mark", True), ("GNSS plan", declared), ("GNSS height", declared)]
@@ -83,7 +96,7 @@ def _rescale(found: Sequence[Test], factors: dict[Part, float], *, declared: boo
         if upward and new < 1.0 + 4.0 / np.sqrt(len(values)):  # what chance does to the median
             new = 1.0
         new = max(new, 1e-6)
-        if max(new / factors[part], factors[part] / new) > _SETTLED:
+        if max(new / factors[part], factors[part] / new) > settled:
             factors[part], changed = new, True
     return changed
 

@@ -1,4 +1,4 @@
-"""Oriented blocks without photographs: tie points and marks drawn from a true flight, for tests and benchmarks of georeferencing."""
+"""Oriented blocks without photographs: tie points and marks of a true flight, for tests and benchmarks of georeferencing."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FRAME = LocalFrame.at("EPSG:32630", 560000.0, 4922000.0, 48.0)
 class Scene:
     """A flight over a beach; ``tilt`` in degrees, ``relief`` the standard deviation that heights are scaled to (m).
 
-    ``points`` are tie points per photograph, ``pixel`` the sigma of their coordinates. The camera's true distortion is not known to
+    ``points`` are tie points per photograph, ``pixel`` the sigma of their coordinates. The camera's distortion is not known to
     the adjustment.
     """
 

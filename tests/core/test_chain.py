@@ -204,7 +204,7 @@ def test_the_surface_is_the_true_one(simulation, whole):
         scatter = 1.4826 * np.median(np.abs(left - np.median(left)))
         weight = 1 / np.maximum(1.0, np.abs(left) / (2 * scatter))
     assert scatter < SCATTER
-    covariance = np.reshape(georef.covariance, (7, 7))[2:5, 2:5]
+    covariance = np.reshape(georef.covariance, (10, 10))[2:5, 2:5]
     assert plane @ np.linalg.solve(covariance, plane) < PLANE
 
 
