@@ -23,7 +23,8 @@ _BIG = 2  # pictures are drawn at twice their size, for thin lines
 _POINTS = 60  # ground points with pictures, so that the page stays small enough to send
 _CAPTION = (
     "Blue circle: where the point is predicted, one sigma wide, with the searched circle dashed around it. Red cross: the mark "
-    "that was found and taken; grey cross: the best of what was found, not taken."
+    "that was found and taken; grey cross: the best of what was found, not taken. Where the circle "
+    "is wide only the surroundings of the mark are shown."
 )
 
 
@@ -127,7 +128,7 @@ def _missed(page: Report, marking: Marking) -> None:
         p, found = marking.predictions[k], marking.found.get(k)
         why = "nothing like a target" if found is None else "not like one enough"
         if k in marking.contradicted:
-            why = "contradicts the point's other marks"
+            why = "contradicts the point's other marks, or is another point's too"
         score = None if found is None else found.score
         rows.append([marking.points[p.point].name, marking.images[p.view], *map(float, p.pixel), p.sigma, score, why])
     page.table(["name", "photograph", "x (px)", "y (px)", "sigma (px)", "best score", "why"], rows)

@@ -84,6 +84,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         told += _reasonable(block, georef, points, predictions)
         progress.at(0.1)
         searches = _searches(request, block, points, predictions, photographs)
+        told += _wide(request, predictions, searches, photographs)
         sights = _look(request, survey, block, photographs, predictions, searches, told, progress.part(0.1, 0.9))
         found = {s.key: s.found for s in sights.values() if s.found is not None}
         taken, contradicted = agreeing(block, predictions, found)
@@ -191,9 +192,25 @@ def _searches(
             continue
         photo = photographs[p.view]
         radius, _ = circle(p, photo.width, photo.height)
-        searches[key] = Search(key, float(p.pixel[0]), float(p.pixel[1]), radius, code, rank < _PICTURES)
-        shown[p.point] = rank + 1
+        searches[key] = Search(key, float(p.pixel[0]), float(p.pixel[1]), radius, code, p.inside and rank < _PICTURES)
+        shown[p.point] = rank + int(p.inside)
     return searches
+
+
+def _wide(
+    request: Request, predictions: Sequence[Prediction], searches: Mapping[int, Search], photographs: Sequence[Photograph]
+) -> list[str]:
+    """Return a sentence when circles had to be cut short."""
+    if request.refine == "none":
+        return []
+    photos = {k: photographs[predictions[k].view] for k in searches}
+    cut = [k for k, photo in photos.items() if circle(predictions[k], photo.width, photo.height)[1]]
+    if not cut:
+        return []
+    return [
+        f"{len(cut)} of {len(searches)} predictions are too uncertain to search all of where the point may be: georeference with "
+        "the marks that were found, or with a few made by eye, and predict again."
+    ]
 
 
 def _look(

@@ -27,7 +27,8 @@ _SPARE = 2.0  # px
 _WIDEST, _SHARE = 600.0, 0.25  # px, and of the shorter side: beyond it a circle holds too much to be searched in earnest
 _SIGMA_MARK = 0.5  # px, what marks may differ by beside the tie points' own residuals
 PICTURE = 150  # px, the side of a picture
-_SHOWN = 24.0  # px, the least half a side of what a picture shows
+_SHOWN, _CLOSE = 24.0, 90.0  # px, the least half a side of what a picture shows, and the most around a mark
+_SAME_PLACE = 3.0  # px
 
 
 @dataclass(frozen=True)
@@ -90,15 +91,19 @@ def look(path: str, photograph: Photograph, refine: Refine, searches: Sequence[S
 def agreeing(block: Block, predictions: Sequence[Prediction], found: Mapping[int, Found]) -> tuple[dict[int, Found], set[int]]:
     """Return the marks to take, by the index of their prediction, and those of the rest that others of the same point contradict.
 
-    A mark is taken from ``ACCEPT`` on, and when the rays of all that are taken of a point meet in one point of the block within
-    five sigmas; where some do not and nothing tells which, none is taken. A point's only mark stands on its score alone.
+    A mark is taken from ``ACCEPT`` on, when no other point was found at the same place, and when the rays of all that are taken
+    of its point meet in one point of the block within five sigmas; where some do not and nothing tells which, none is taken. A
+    point's only mark stands on its score alone.
     """
     sigma = float(np.hypot(_SIGMA_MARK, np.median(block.errors) if len(block.errors) else 0.0))
     taken: dict[int, Found] = {}
     contradicted: set[int] = set()
     by_point: dict[int, list[int]] = {}
-    for key, mark in found.items():
-        if mark.score >= ACCEPT:
+    good_enough = [k for k, mark in found.items() if mark.score >= ACCEPT]
+    for key in good_enough:
+        if any(k != key and _one_place(k, key, predictions, found) for k in good_enough):
+            contradicted.add(key)
+        else:
             by_point.setdefault(predictions[key].point, []).append(key)
     for keys in by_point.values():
         good = keys
@@ -111,12 +116,17 @@ def agreeing(block: Block, predictions: Sequence[Prediction], found: Mapping[int
     return taken, contradicted
 
 
+def _one_place(a: int, b: int, predictions: Sequence[Prediction], found: Mapping[int, Found]) -> bool:
+    apart = np.hypot(found[a].x - found[b].x, found[a].y - found[b].y)
+    return predictions[a].view == predictions[b].view and bool(apart < _SAME_PLACE)
+
+
 def _pictured(values: NDArray[np.generic], search: Search, found: Found | None) -> Sight:
-    half = max(_SHOWN, 1.2 * search.radius)
-    if found is not None:
-        half = max(half, 1.2 * max(abs(found.x - search.x), abs(found.y - search.y)) + 8.0)
-    left, top = (max(0, round(c - half)) for c in (search.x, search.y))
-    crop = np.asarray(values[top : round(search.y + half), left : round(search.x + half)], np.float32)
+    half, x, y = max(_SHOWN, 1.2 * search.radius), search.x, search.y
+    if found is not None and half > _CLOSE:
+        half, x, y = _CLOSE, found.x, found.y
+    left, top = (max(0, round(c - half)) for c in (x, y))
+    crop = np.asarray(values[top : max(round(y + half), 0), left : max(round(x + half), 0)], np.float32)
     if not crop.size:
         return Sight(search.key, found, None)
     low, high = np.percentile(crop, [1, 99])

@@ -26,9 +26,10 @@ _STEP = float(np.sqrt(2.0))
 _PEAKS = 4  # candidates per harmonic and level
 _TRIED = 6  # candidates of a kind that are fitted
 _WIDENED = 3  # candidates whose window is widened
-_ALIKE, _ALIKE_STILL = 0.85, 0.97  # likeness from which a window is widened, and the share of the best it must keep
+_ALIKE, _ALIKE_STILL = 0.85, 0.99  # likeness from which a window is widened, and the share of the best it must keep
 _OWN = 1.0  # window radii within which what is found is the same centre
-_CLUTTER = 2.5  # times the median response: what the best of a few places reaches by chance
+_CLUTTER = 3.5  # times the usual response: what the best of a few places reaches by chance
+_USUAL = 0.25  # quantile of the responses; lower than the median, for a large target fills much of a crop
 _PER_HARMONIC: tuple[tuple[int, Kind], ...] = ((2, "quadrants"), (4, "cross"))
 # A Gaussian-blurred edge, an image's noise and a printer leave no centre better than this.
 _FINEST = 0.03  # px
@@ -54,7 +55,7 @@ class _Candidate:
     phase: float
     radius: float
     rank: float
-    clutter: float  # the median response at this scale over the one here
+    clutter: float  # the usual response at this scale over the one here
 
 
 def largest_radius(width: int, height: int) -> float:
@@ -161,7 +162,7 @@ def _peaks(level: Image, order: int, kind: Kind, centre: Array, radius: float, s
     inside = np.hypot(columns - centre[0], rows - centre[1]) <= radius
     rows, columns = rows[inside], columns[inside]
     order_of = np.argsort(-rank[rows, columns])[:_PEAKS]
-    usual = float(np.median(strength))
+    usual = float(np.quantile(strength, _USUAL))
     return [
         _Candidate(
             kind,
