@@ -8,7 +8,6 @@ perspective, and the correlation is the score.
 from __future__ import annotations
 
 import re
-from functools import cache
 
 import cv2
 import numpy as np
@@ -77,24 +76,27 @@ def find_code(image: NDArray[np.float32], code: int, centre: Array, radius: floa
 
 def _detected(grey: NDArray[np.uint8], code: int) -> list[tuple[NDArray[np.float32], str]]:
     """Return the corners (4, 2) of all codes of this number, and their dictionaries."""
-    families = list(DICTIONARIES)
-    corners, numbers, _, used = _detector().detectMarkersMultiDict(grey)
+    # Dictionaries of the one code: to compare each dark square with thousands of codes takes seconds.
+    families, dictionaries = [], []
+    for name, key in DICTIONARIES.items():
+        full = cv2.aruco.getPredefinedDictionary(key)
+        if code < len(full.bytesList):
+            families.append(name)
+            dictionaries.append(cv2.aruco.Dictionary(full.bytesList[code : code + 1], full.markerSize, full.maxCorrectionBits))
+    if not families:
+        return []
+    corners, numbers, _, used = cv2.aruco.ArucoDetector(dictionaries, _options()).detectMarkersMultiDict(grey)
     if numbers is None:
         return []
-    return [
-        (np.asarray(c, np.float32).reshape(4, 2), families[int(d)])
-        for c, number, d in zip(corners, np.ravel(numbers), np.ravel(used), strict=True)
-        if int(number) == code
-    ]
+    return [(np.asarray(c, np.float32).reshape(4, 2), families[int(d)]) for c, d in zip(corners, np.ravel(used), strict=True)]
 
 
-@cache
-def _detector() -> cv2.aruco.ArucoDetector:
+def _options() -> cv2.aruco.DetectorParameters:
     options = cv2.aruco.DetectorParameters()
     options.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     options.errorCorrectionRate = 0.3  # few wrong bits, for many families are tried
     options.minMarkerPerimeterRate = 0.02
-    return cv2.aruco.ArucoDetector([cv2.aruco.getPredefinedDictionary(d) for d in DICTIONARIES.values()], options)
+    return options
 
 
 def _laid(grey: NDArray[np.uint8], name: str, code: int, corners: NDArray[np.float32]) -> tuple[Array, float] | None:
