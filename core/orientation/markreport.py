@@ -94,8 +94,8 @@ def write_report(path: Path, copy: str | None, marking: Marking) -> None:
         [_row(marking, i) for i in range(len(marking.points))],
     )
     page.text(
-        "A sigma is that of one axis, from the georeferencing's own covariance, the point's survey, and half a pixel for the "
-        "pose. Offsets, found minus predicted, are root mean squares of an axis; beside the sigma they ought to be about 1."
+        "A sigma is that of one axis, from the georeferencing's own covariance, the point's survey, and a third of a pixel for "
+        "the pose. Offsets, found minus predicted, are root mean squares of an axis; beside the sigma they ought to be about 1."
     )
     if marking.refine != "none":
         _missed(page, marking)

@@ -120,14 +120,17 @@ def _fit(image: NDArray[np.float32], kind: Kind, start: Array, radius: float) ->
     return Fitted(kind, radius, parameters, inverse[:2, :2] * variance, likeness, abs(gain), level)
 
 
-def start_at(kind: Kind, x: float, y: float, phase: float, radius: float) -> Array:
-    """Return parameters to start from, of a target whose second (quadrants) or fourth harmonic (cross) has this phase (rad)."""
+def starts_at(kind: Kind, x: float, y: float, phase: float, radius: float) -> list[Array]:
+    """Return parameters to start from, of a target whose second (quadrants) or fourth harmonic (cross) has this phase (rad).
+
+    The brightest directions are those of a cross's bars, or with dark bars those between them.
+    """
     if kind == "quadrants":
         # cos(2 (t - turn)) is largest in the middle of the bright quadrants; the edges are 45 degrees to both sides.
         turn = phase / 2
-        return np.array([x, y, turn + np.pi / 4, turn - np.pi / 4, 1.2])
-    turn = phase / 4
-    return np.array([x, y, turn, turn + np.pi / 2, 1.2, max(0.2 * radius, 1.0)])
+        return [np.array([x, y, turn + np.pi / 4, turn - np.pi / 4, 1.2])]
+    half = max(0.2 * radius, 1.0)
+    return [np.array([x, y, turn, turn + np.pi / 2, 1.2, half]) for turn in (phase / 4, phase / 4 + np.pi / 4)]
 
 
 def _possible(p: Array, start: Array, radius: float) -> bool:

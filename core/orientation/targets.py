@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .targetfit import Fitted, Kind, fit_target, start_at
+from .targetfit import Fitted, Kind, fit_target, starts_at
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -31,8 +31,8 @@ _OWN = 1.0  # window radii within which what is found is the same centre
 _CLUTTER = 3.5  # times the usual response: what the best of a few places reaches by chance
 _USUAL = 0.25  # quantile of the responses; lower than the median, for a large target fills much of a crop
 _PER_HARMONIC: tuple[tuple[int, Kind], ...] = ((2, "quadrants"), (4, "cross"))
-# A Gaussian-blurred edge, an image's noise and a printer leave no centre better than this.
-_FINEST = 0.03  # px
+# What rendered targets scatter by at best (px); the bars of a cross taper under perspective, which the model leaves out.
+_FINEST: dict[Kind, float] = {"quadrants": 0.03, "cross": 0.06}
 _CORRELATED = 2.0  # neighbouring pixels share noise (demosaicing, JPG), which the fit takes for independent
 
 
@@ -85,10 +85,10 @@ def find_target(image: Image, centre: Array, radius: float, largest: float) -> F
     fits: list[tuple[Fitted, float]] = []
     candidates = _candidates(image, np.asarray(centre) - 0.5, radius, largest)
     for candidate in candidates:
-        start = start_at(candidate.kind, candidate.x, candidate.y, candidate.phase, candidate.radius)
-        fitted = fit_target(image, candidate.kind, start, candidate.radius)
-        if fitted is not None and float(np.hypot(*(fitted.centre + 0.5 - centre))) <= radius:
-            fits.append((fitted, candidate.clutter))
+        for start in starts_at(candidate.kind, candidate.x, candidate.y, candidate.phase, candidate.radius):
+            fitted = fit_target(image, candidate.kind, start, candidate.radius)
+            if fitted is not None and float(np.hypot(*(fitted.centre + 0.5 - centre))) <= radius:
+                fits.append((fitted, candidate.clutter))
     fits.sort(key=lambda f: -_strength(f[0]))
     fits[:_WIDENED] = [(_widened(image, f, largest), clutter) for f, clutter in fits[:_WIDENED]]
     if not fits:
@@ -97,7 +97,7 @@ def find_target(image: Image, centre: Array, radius: float, largest: float) -> F
     others = [_strength(f) for f, _ in fits if float(np.hypot(*(f.centre - best.centre))) > _OWN * best.radius]
     rival = max([*others, 0.0]) / _strength(best)
     score = best.likeness**2 * max(0.0, 1.0 - max(rival, _CLUTTER * clutter) ** 2)
-    sigma = float(np.hypot(_CORRELATED * np.sqrt(max(float(np.trace(best.covariance)), 0.0) / 2), _FINEST))
+    sigma = float(np.hypot(_CORRELATED * np.sqrt(max(float(np.trace(best.covariance)), 0.0) / 2), _FINEST[best.kind]))
     return Found(float(best.centre[0]) + 0.5, float(best.centre[1]) + 0.5, sigma, float(min(score, 1.0)), best.kind)
 
 

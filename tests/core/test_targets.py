@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from strandline.core.orientation.codes import DICTIONARIES, code_of, find_code
-from strandline.core.orientation.targetfit import fit_target, start_at
+from strandline.core.orientation.targetfit import fit_target, starts_at
 from strandline.core.orientation.targets import ACCEPT, find_target
 
 SIZE, FINE = 160, 4  # px of a picture, samples per pixel each way
@@ -82,7 +82,7 @@ def rendered(paint, half, rng, *, lean=0.15, noise=0.02, blur=0.8, gamma=1.0, at
     return (np.clip(image, 0, None) ** gamma).astype(np.float32), centre
 
 
-def errors(paint, half, count=10, **options):
+def errors(paint, half, count=6, **options):
     """Errors (n, 2) of the accepted of ``count`` targets, and their claimed sigmas."""
     rng = np.random.default_rng(7)
     found = []
@@ -101,22 +101,22 @@ def errors(paint, half, count=10, **options):
 )
 def test_a_target_is_found_to_a_small_part_of_a_pixel(paint, half, limit):
     found = errors(paint, half)
-    assert len(found) >= 9
+    assert len(found) >= 5
     assert np.sqrt(np.mean(found[:, :2] ** 2)) < limit
     assert np.sqrt(np.mean((found[:, :2] / found[:, 2:]) ** 2)) < 1.5
 
 
 def test_a_tone_curve_and_strong_blur_and_noise_do_not_move_the_centre():
     found = errors(quadrants, 18, gamma=0.45, blur=2.0, noise=0.08)
-    assert len(found) == 10
+    assert len(found) == 6
     assert np.abs(found[:, :2].mean(axis=0)).max() < 0.1
     assert np.sqrt(np.mean(found[:, :2] ** 2)) < 0.15
 
 
 @pytest.mark.parametrize("paint", [square, disc, bar, halves, sand_alone])
-@pytest.mark.parametrize("half", [8, 18, 40])
+@pytest.mark.parametrize("half", [8, 25])
 def test_nothing_is_found_where_there_is_no_target(paint, half):
-    assert len(errors(paint, half, count=5)) == 0
+    assert len(errors(paint, half, count=4)) == 0
 
 
 def test_two_targets_in_the_circle_are_not_told_apart():
@@ -144,7 +144,8 @@ def test_the_fit_finds_lines_and_contrast():
     first, second = np.radians(20.0), np.radians(95.0)
     s1, s2 = (np.cos(t) * (y - 30.3) - np.sin(t) * (x - 29.6) for t in (first, second))
     image = (5.0 + 2.0 * np.tanh(s1) * np.tanh(s2)).astype(np.float32)
-    fitted = fit_target(image, "quadrants", start_at("quadrants", 31.0, 29.0, np.radians(115.0), 15.0), 15.0)
+    (start,) = starts_at("quadrants", 31.0, 29.0, np.radians(115.0), 15.0)
+    fitted = fit_target(image, "quadrants", start, 15.0)
     assert fitted is not None
     assert fitted.centre == pytest.approx([29.6, 30.3], abs=0.005)
     assert sorted(np.degrees(fitted.parameters[2:4]) % 180) == pytest.approx([20.0, 95.0], abs=0.2)
