@@ -16,8 +16,8 @@ from .similarity import design_matrix
 
 Array = NDArray[np.float64]
 
-# What a pose errs against its neighbours, in pixels per axis, beside the residuals of its tie points: a block held by tie points is
-# not stiff. The targets of a simulated survey that was georeferenced with its marks lie 0.33 px from their predictions, the
+# What a pose errs against its neighbours, in pixels per axis, beside the residuals of its tie points: a block held by tie points
+# is not stiff. The targets of a simulated survey that was georeferenced with its marks lie 0.33 px from their predictions, the
 # centimetre (0.26 px) of the points' survey included; more is left for blocks with fewer tie points.
 _POSE = 0.3
 _STEP = 1e-5  # of the distance, for derivatives: exact to far below a pixel's hundredth
