@@ -8,6 +8,7 @@ from .enhance import Enhance
 from .exportdsm import ExportDsm
 from .georeference import Georeference
 from .orient import Orient
+from .predictmarks import PredictMarks
 from .simulatesurvey import SimulateSurvey
 from .tiepoints import TiePoints
 
@@ -17,6 +18,7 @@ ALGORITHMS = (
     TiePoints,
     Orient,
     Georeference,
+    PredictMarks,
     ExportDsm,
     DsmDifference,
     CompareInputs,

@@ -34,6 +34,16 @@ def ground_points() -> Iterable[QgsProcessingParameterDefinition]:
     )
 
 
+def known_points() -> Iterable[QgsProcessingParameterDefinition]:
+    """Return the layer of ground points to look for, without roles: it and its names are needed."""
+    needed = ("GCPS", "NAME_FIELD")
+    for parameter in ground_points():
+        if parameter.name() in needed:
+            parameter.setFlags(parameter.flags() & ~QgsProcessingParameterDefinition.Flag.FlagOptional)
+        if parameter.name() != "ROLE_FIELD":
+            yield parameter
+
+
 def marks() -> Iterable[QgsProcessingParameterDefinition]:
     """Return the marks, the file that holds points and marks, and what is said of them."""
     yield ask.table(

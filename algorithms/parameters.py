@@ -179,9 +179,9 @@ def point_output(key: str, label: str, text: str) -> _Parameter:
     return explained(QgsProcessingParameterFeatureSink(key, label, _POINTS, None, True, True), text)
 
 
-def table_output(key: str, label: str, text: str) -> _Parameter:
-    """Return an optional table to write."""
-    return explained(QgsProcessingParameterFeatureSink(key, label, _ANY, None, True, True), text)
+def table_output(key: str, label: str, text: str, *, optional: bool = True) -> _Parameter:
+    """Return a table to write."""
+    return explained(QgsProcessingParameterFeatureSink(key, label, _ANY, None, optional, True), text)
 
 
 def polygon_output(key: str, label: str, text: str) -> _Parameter:

@@ -14,6 +14,7 @@ _MODULES = {
     "tiepoints": ".tiepoints.tiepoints",
     "orient": ".orientation.orient",
     "georeference": ".orientation.georeference",
+    "predictmarks": ".orientation.predictmarks",
     "exportdsm": ".surface.exportdsm",
     "dsmdifference": ".change.dsmdifference",
     "compareinputs": ".comparison.compareinputs",

@@ -968,6 +968,42 @@
    <translation>Fichiers HTML (*.html)</translation>
   </message>
   <message>
+   <source>Predict marks</source>
+   <translation>Prédire les pointés</translation>
+  </message>
+  <message>
+   <source>Tells where each ground point appears in which photograph of a georeferenced survey, and how well that is known; painted and coded targets are measured there. The table is what 'Georeference' takes as marks: georeference with the positions of the photographs or with a few marks first, predict, and georeference again.</source>
+   <translation>Indique où chaque point au sol apparaît dans quelle photographie d'un levé géoréférencé, et avec quelle précision on le sait ; les cibles peintes et codées y sont mesurées. La table est celle que « Géoréférencer » prend pour pointés : géoréférencez d'abord avec les positions des photographies ou avec quelques pointés, prédisez, puis géoréférencez de nouveau.</translation>
+  </message>
+  <message>
+   <source>Measure the targets</source>
+   <translation>Mesurer les cibles</translation>
+  </message>
+  <message>
+   <source>none: predictions only, to be corrected by eye; target: black-and-white targets of four alternating quadrants, or crosses on a plain ground; code: ArUco and AprilTag codes whose number the point's name ends with. Only targets that are found enter the table, the others are named in the report.</source>
+   <translation>none : prédictions seules, à corriger à l'œil ; target : cibles noir et blanc à quatre quadrants alternés, ou croix sur un fond uni ; code : codes ArUco et AprilTag dont le numéro termine le nom du point. Seules les cibles trouvées entrent dans la table, les autres sont nommées dans le rapport.</translation>
+  </message>
+  <message>
+   <source>Marks</source>
+   <translation>Pointés</translation>
+  </message>
+  <message>
+   <source>A row for each mark: gcp, image, x and y in pixels from the top-left corner, sigma of an axis in pixels, and the score of a target that was found, from 0 to 1.</source>
+   <translation>Une ligne par pointé : gcp, image, x et y en pixels depuis le coin supérieur gauche, sigma par axe en pixels, et la note de 0 à 1 d'une cible trouvée.</translation>
+  </message>
+  <message>
+   <source>Ground points with a mark</source>
+   <translation>Points au sol pointés</translation>
+  </message>
+  <message>
+   <source>Photographs with a mark</source>
+   <translation>Photographies avec un pointé</translation>
+  </message>
+  <message>
+   <source>Marks predicted but not found</source>
+   <translation>Pointés prédits mais non trouvés</translation>
+  </message>
+  <message>
    <source>Simulate survey</source>
    <translation>Simuler un levé</translation>
   </message>

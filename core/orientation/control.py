@@ -80,7 +80,7 @@ def given_from_layers(
     """
     layer = read_layer(points)
     if not len(layer):
-        raise InputError(f"The layer {layer.name} of GCPs is empty: add points, or leave GCPS empty.")
+        raise InputError(f"The layer {layer.name} of GCPs is empty: add points to it.")
     if not name_field:
         raise InputError(f"NAME_FIELD is needed to match the points of {layer.name} with their marks: choose the field of names.")
     names = layer.text(name_field)

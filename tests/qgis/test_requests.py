@@ -151,6 +151,41 @@ def test_points_keep_z_ids_types_and_nulls(sent, survey, tmp_path):
     assert read(sent.folder / "marks.gpkg") == [(1, None, {"gcp": "G1", "image": "a.jpg", "x": "10.5", "y": "20"})]
 
 
+def test_marks_are_a_table_that_georeference_takes_back(fake_engine, qgis, survey, tmp_path):
+    import processing
+
+    fake_engine(
+        f"""
+        from osgeo import ogr
+        Path({str(tmp_path / "request.json")!r}).write_text(json.dumps(request))
+        if step == "predictmarks":
+            data = ogr.GetDriverByName("GPKG").CreateDataSource(request["output"])
+            table = data.CreateLayer("marks", None, ogr.wkbNone)
+            for name, kind in (("gcp", ogr.OFTString), ("image", ogr.OFTString), ("x", ogr.OFTReal), ("score", ogr.OFTReal)):
+                table.CreateField(ogr.FieldDefn(name, kind))
+            feature = ogr.Feature(table.GetLayerDefn())
+            for name, value in (("gcp", "G1"), ("image", "a.jpg"), ("x", 10.5)):
+                feature.SetField(name, value)
+            table.CreateFeature(feature)
+            del table, data
+        else:
+            data = ogr.Open(request["marks"]["path"])
+            Path({str(tmp_path / "marks.json")!r}).write_text(json.dumps([f.items() for f in data.GetLayer(0)]))
+        counts = {{k: 1 for k in ("gcp_count", "image_count", "mark_count", "missed_count")}}
+        say(type="result", result=counts if step == "predictmarks" else {{"output": request["survey"], "control_count": 1}})
+        """
+    )
+    gcps = memory("PointZ?crs=EPSG:32631", ["name:string"], [("POINT Z (500000 5000000 12.25)", ["G1"])])
+    given = {"SURVEY": survey, "GCPS": gcps, "NAME_FIELD": "name"}
+    made = processing.run("strandline:predictmarks", {**given, "REFINE": "target", "OUTPUT": "TEMPORARY_OUTPUT"})
+    request = json.loads((tmp_path / "request.json").read_text())
+    assert (request["refine"], request["sigma_h"], request["sigma_h_field"]) == ("target", 0.01, None)
+    assert (made["MARK_COUNT"], made["MISSED_COUNT"]) == (1, 1)
+    processing.run("strandline:georeference", {**given, "MARKS": made["OUTPUT"]})
+    (mark,) = json.loads((tmp_path / "marks.json").read_text())
+    assert {k: mark[k] for k in ("gcp", "image", "x", "score")} == {"gcp": "G1", "image": "a.jpg", "x": 10.5, "score": None}
+
+
 def test_only_selected_features_when_asked_and_their_own_ids(sent, survey):
     from qgis.core import QgsProcessingFeatureSourceDefinition, QgsProject
 
@@ -319,6 +354,7 @@ def test_a_number_that_is_not_determined_is_none(fake_engine, qgis, survey):
         ("enhance", {"SURVEY": "SURVEY", "METHOD": "magic"}, "METHOD"),
         ("georeference", {"SURVEY": "SURVEY", "GCPS": "layer"}, "GCPS need NAME_FIELD"),
         ("georeference", {"SURVEY": "SURVEY", "GCPS": "layer", "NAME_FIELD": "name"}, "GCPS need MARKS"),
+        ("predictmarks", {"SURVEY": "SURVEY", "GCPS": "layer"}, "NAME_FIELD"),
         ("georeference", {"SURVEY": "SURVEY", "USE_GNSS": False}, "Nothing to georeference with"),
         ("georeference", {"SURVEY": "SURVEY", "GCPS": "layer", "GCP_FILE": "/x"}, "exclude each other"),
     ],
