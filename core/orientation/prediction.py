@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 
 from ..block import Block, View
 from ..georef import Georef
+from .common import TERMS, Common
 from .control import GroundPoint
-from .similarity import design_matrix
 
 Array = NDArray[np.float64]
 
@@ -58,12 +58,11 @@ class Prediction:
 def ground_covariance(georef: Georef, points: Array) -> Array:
     """Return what the georeferencing's own error does to local ground points (n, 3): covariances (n, 3, 3) in m2.
 
-    The one place here that reads ``Georef.covariance``: shift, rotation and scale about the pivot. NaN when it is not known.
+    NaN when it is not known.
     """
-    if len(georef.covariance) != 49 or len(georef.pivot) != 3:
+    if len(georef.covariance) != TERMS**2 or len(georef.pivot) != 3:
         return np.full((len(points), 3, 3), np.nan)
-    design = design_matrix(points, np.asarray(georef.pivot))
-    return np.asarray(design @ np.reshape(georef.covariance, (7, 7)) @ design.transpose(0, 2, 1))
+    return Common(np.asarray(georef.pivot), np.reshape(georef.covariance, (TERMS, TERMS))).uncertainty(points)
 
 
 def predict(block: Block, georef: Georef, points: Sequence[GroundPoint]) -> list[Prediction]:

@@ -52,7 +52,10 @@ def ground(name, local, sigma_h=1e-6, sigma_v=1e-6):
 
 
 def georef(covariance):
-    return Georef(frame(), "similarity", (), (0.0, 0.0, 0.0), tuple(np.ravel(covariance).tolist()))
+    """Return a georeferencing that errs by a similarity's covariance (7, 7) and does not bend."""
+    wide = np.zeros((10, 10))
+    wide[:7, :7] = covariance
+    return Georef(frame(), "similarity", (), (0.0, 0.0, 0.0), tuple(np.ravel(wide).tolist()))
 
 
 def test_a_prediction_by_hand():
