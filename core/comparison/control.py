@@ -27,11 +27,15 @@ _FAR = 1000.0  # m in plan between ground points and photographs; a wrong CRS
 
 
 def raw_request(
-    request: georeference.Request, marks_raw: VectorSource | None, exposures: Exposures, folder: Path
+    request: georeference.Request,
+    marks_raw: VectorSource | None,
+    exposures: Exposures,
+    folder: Path,
+    crs: str | None = None,
 ) -> georeference.Request:
     """Return the request for the RAW cases, with the JPG's marks moved to the RAW's frame unless ``marks_raw`` are given.
 
-    Layers that it needs are written into ``folder``.
+    Layers that it needs are written into ``folder``. ``crs`` is the survey's, which ground points have whose format names none.
 
     Raises
     ------
@@ -48,7 +52,7 @@ def raw_request(
     _write(given, marks, points, table)
     return replace(
         request,
-        gcps=VectorSource(str(points), points.stem, given.crs),
+        gcps=VectorSource(str(points), points.stem, given.crs or request.crs or crs),
         marks=VectorSource(str(table), table.stem),
         gcp_file=None,
         name_field="name",

@@ -64,7 +64,10 @@ def test_multipoints_of_one_point_are_points(tmp_path):
         ([shapely.Point(1, 2)], "Point", {"n": ["A"]}, "no heights"),
         ([shapely.Point(1, 2, 3)], "Point Z", {"n": [None]}, "has no name"),
         ([shapely.LineString([(1, 2, 3), (2, 3, 4)])], "LineString Z", {"n": ["A"]}, "not one point"),
-        ([None], "Point Z", {"n": ["A"]}, "not one point"),
+        ([None], "Point Z", {"n": ["A"]}, "A of gcps has no geometry"),
+        ([shapely.Point()], "Point Z", {"n": ["A"]}, "A of gcps has no geometry"),
+        ([shapely.MultiPoint([(1, 2, 3), (2, 3, 4)])], "MultiPoint Z", {"n": ["A"]}, "A of gcps is not one point"),
+        ([shapely.box(0, 0, 1, 1)], "Polygon", {"n": ["A"]}, "A of gcps is not one point"),
     ],
 )
 def test_layers_that_are_no_control(tmp_path, shapes, kind, fields, why):
