@@ -181,6 +181,10 @@ def in_metres(given: Given, crs: str) -> Array:
         raise InputError(f"The coordinates of {given.where} are no degrees, but its CRS is {source.name}: set the right CRS.")
     if source.is_geocentric:
         raise InputError(f"{given.where} is in {source.name}, which is geocentric: give longitude, latitude and height.")
+    if not (source.is_projected or source.is_geographic):
+        raise InputError(
+            f"{given.where} is in the local system {source.name}, which nothing ties to a map: give a projected CRS."
+        )
     axes = source.axis_info
     if len(axes) > 2 and axes[2].direction == "down":
         raise InputError(f"{given.where} has depths ({source.name}): give heights, which count upwards.")

@@ -16,7 +16,7 @@ from ..errors import InputError
 from . import micmac
 from .control import Given
 from .gcptables import read_table
-from .gcptext import FORMATS, Part, parse_xml, read_text
+from .gcptext import Part, parse_xml, read_text
 from .marks import key_of
 from .metashape import read_markers
 from .odm import read_odm
@@ -67,10 +67,7 @@ def read_part(path: Path) -> Part:
             return micmac.read_points(root, name)
         if micmac.holds_marks(root):
             return micmac.read_marks(root, name)
-        chunk = root if root.tag == "chunk" else root.find(".//chunk")
-        if root.tag not in ("document", "chunk") or chunk is None:
-            raise InputError(f"{name} is neither Metashape's marker XML nor MicMac's points or image measures: give {FORMATS}.")
-        return read_markers(chunk, name)
+        return read_markers(root, name)
     if micmac.is_text(text):
         return micmac.read_text_points(text, name)
     return read_table(text, name) or read_odm(text, name)

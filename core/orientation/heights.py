@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 Kind = Literal["ellipsoidal", "orthometric", "unknown"]
 
 _MOST = 120.0  # m; EGM2008 lies between -107 and +86 m
+_METRES = ("", "m", "metre", "metres", "meter", "meters")
 _OF_A_GEOID = ("height", "geoid", "level", "msl", "navd", "nap", "egm", "datum")
 
 
@@ -107,6 +108,8 @@ def undulation(geoid: str, points: Array, crs: str) -> Array:
     with RasterFile(geoid) as raster:
         if not raster.crs or not raster.placed:
             raise InputError(f"The geoid {geoid} has no CRS: give a georeferenced raster.")
+        if raster.unit.strip().lower() not in _METRES:
+            raise InputError(f"The geoid {geoid} declares its heights in {raster.unit!r}: convert them to metres.")
         plane = horizontal(raster.crs)
         x, y = transformer(crs, plane).transform(points[:, 0], points[:, 1])
         a, b, c, d, e, f = raster.transform

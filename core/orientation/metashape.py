@@ -8,18 +8,26 @@ import numpy as np
 
 from ..errors import InputError
 from .control import Given
-from .gcptext import Part
+from .gcptext import FORMATS, Part
 from .marks import Mark
 
 
-def read_markers(chunk: ElementTree.Element, name: str) -> Part:
-    """Read a chunk of Metashape's marker XML, whose pixels count from the corner as ours do (the manual's appendix).
+def read_markers(root: ElementTree.Element, name: str) -> Part:
+    """Read Metashape's marker XML, whose pixels count from the corner as ours do (the manual's appendix).
 
     Raises
     ------
     InputError
-        When it has no markers with coordinates, or something in it is not a number.
+        When it is none, has no markers with coordinates or several chunks with them, or something in it is not a number.
     """
+    chunks = [root] if root.tag == "chunk" else list(root.iter("chunk"))
+    if root.tag not in ("document", "chunk") or not chunks:
+        raise InputError(f"{name} is neither Metashape's marker XML nor MicMac's points or image measures: give {FORMATS}.")
+    surveyed = [c for c in chunks if c.find("markers//marker/reference[@x]") is not None]
+    if len(surveyed) > 1:
+        labels = ", ".join(repr(c.get("label", "")) for c in surveyed[:4])
+        raise InputError(f"{name} has {len(surveyed)} chunks with ground points ({labels}): export the markers of one chunk.")
+    chunk = surveyed[0] if surveyed else chunks[0]
     crs = chunk.findtext("reference")
     cameras = {c.get("id"): c.get("label", "") for c in chunk.iterfind("cameras//camera")}
     names: dict[str | None, str] = {}
@@ -31,7 +39,8 @@ def read_markers(chunk: ElementTree.Element, name: str) -> Part:
         label = marker.get("label") or f"marker {marker.get('id')}"
         names[marker.get("id")] = label
         places.append([_number(reference, a, name, label) for a in ("x", "y", "z")])
-        sigmas.append([_number(reference, a, name, label) for a in ("sx", "sz")])
+        sx, sy, sz = (_number(reference, a, name, label) for a in ("sx", "sy", "sz"))
+        sigmas.append([np.sqrt((sx**2 + sy**2) / 2), sz])
         # Metashape adjusts on the ticked markers and checks on the others.
         roles.append("control" if reference.get("enabled", "true").lower() in ("true", "1") else "check")
     if not names:

@@ -155,6 +155,10 @@ def test_what_does_not_match_is_listed():
         ({"coordinates": PLACES * [1, 1, np.nan]}, "no complete coordinates"),
         ({"coordinates": np.array([[3.0, 45.0, 1.0], [3.001, 45.0, 1.0], [3.0, 45.001, 1.0]])}, "look like degrees"),
         ({"crs": "EPSG:4326"}, "are no degrees"),
+        (
+            {"crs": 'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1]]'},
+            "gcps is in the local system",
+        ),
         ({"crs": "EPSG:4978"}, "which is geocentric: give longitude, latitude and height"),
         ({"crs": "EPSG:32631+5706"}, "has depths"),
         (

@@ -116,6 +116,13 @@ def test_metashape_takes_what_was_measured(tmp_path):
     assert given.marks == (Mark("A", "DJI_0001", 10.5, 20.5), Mark("B", "DJI_0002.JPG", 30.0, 40.0))
 
 
+def test_metashapes_chunk_with_ground_points_is_the_one_that_counts(tmp_path):
+    two = METASHAPE.replace("<chunk label", '<chunk label="other"><markers/></chunk><chunk label', 1)
+    given = read(tmp_path, two.replace('sx="0.01" sy="0.01"', 'sx="0.03" sy="0.04"'), "markers.xml")
+    assert given.names == ("A", "B")
+    assert given.sigmas[0] == pytest.approx([np.sqrt((0.03**2 + 0.04**2) / 2), 0.03])
+
+
 BOMB = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;">]><document>&b;</document>'
 
 
@@ -127,6 +134,8 @@ BOMB = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a
         ("<kml/>", "neither Metashape"),
         ("<document><chunk><markers/></chunk></document>", "no markers with coordinates"),
         (METASHAPE.replace('z="3.5"', 'z="high"'), "not a number"),
+        ("<html><chunk/></html>", "neither Metashape"),
+        (METASHAPE.replace("</document>", METASHAPE[METASHAPE.index("<chunk") :]), r"has 2 chunks with ground points \('beach'"),
         ("<Global><DicoAppuisFlottant><OneAppuisDAF/></DicoAppuisFlottant></Global>", "has no NamePt"),
     ],
 )

@@ -91,6 +91,16 @@ def test_a_raster_in_another_unit_is_refused(tmp_path, factor):
         undulation(path, np.array([[512000.0, 4983000.0]]), UTM)
 
 
+def test_a_raster_that_declares_feet_is_refused(tmp_path):
+    import rasterio
+
+    path = geoid(tmp_path / "n.tif", np.full((4, 5), 47.0))
+    with rasterio.open(path, "r+", IGNORE_COG_LAYOUT_BREAK="YES") as file:
+        file.set_band_unit(1, "ft")
+    with pytest.raises(InputError, match="declares its heights in 'ft': convert them to metres"):
+        undulation(path, np.array([[512000.0, 4983000.0]]), UTM)
+
+
 # What a CRS says
 
 
