@@ -239,14 +239,18 @@ def _zero_heights(given: Given) -> list[str]:
 
 
 def _role(where: str, role: str) -> bool:
-    word = "".join(c for c in unicodedata.normalize("NFKD", role.casefold()) if c.isalnum())
+    word = _bare(role)
     if word in _CHECK:
         return True
     if word in _CONTROL:
         return False
-    if word in ("controle", "pointdecontrole", "cp", "gcpcp"):
+    if word in map(_bare, ("contrôle", "point de contrôle", "CP")):  # a French one checks, a Portuguese one controls
         raise InputError(f"The role {role!r} in {where} can mean control as well as check: write control or check.")
     raise InputError(f"The role {role!r} in {where} is not known: write control or check.")
+
+
+def _bare(role: str) -> str:
+    return "".join(c for c in unicodedata.normalize("NFKD", role.casefold()) if c.isalnum())
 
 
 def _have(names: Sequence[str]) -> str:

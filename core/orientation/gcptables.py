@@ -46,8 +46,8 @@ _IMAGE = ("image", "imagename", "imagefilename", "img", "imgname", "photo", "cam
 _X = ("x", "xeast", "xeasting", "xlongitude", "easting", "east", "e", "longitude", "lon")
 _Y = ("y", "ynorth", "ynorthing", "ylatitude", "northing", "north", "n", "latitude", "lat")
 _Z = ("z", "zaltitude", "altitude", "height", "elevation", "elev", "h")
-_COLUMN = ("x", "u", "imageu", "imagex", "imx", "imgx", "px", "pixelx", "xpx", "column", "col", "imcol")
-_ROW = ("y", "v", "imagev", "imagey", "imy", "imgy", "py", "pixely", "ypx", "row", "line", "imrow")
+_COLUMN = ("x", "u", "imageu", "imagex", "imx", "imgx", "px", "pxx", "xpx", "column", "col", "imcol")
+_ROW = ("y", "v", "imagev", "imagey", "imy", "imgy", "py", "pxy", "ypx", "row", "line", "imrow")
 _SIGMA_H = (
     "sigmah",
     "accuracyxym",
@@ -139,7 +139,7 @@ def _cells(line: str, separator: str, name: str) -> tuple[str, ...]:
 
 
 def _word(cell: str) -> str:
-    return re.sub(r"[^a-z]", "", cell.casefold())
+    return re.sub(r"[^a-z]", "", cell.casefold()).replace("pixel", "px")
 
 
 def _points(table: _Table) -> Part:

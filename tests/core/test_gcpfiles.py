@@ -312,6 +312,7 @@ def test_metashapes_reference_beside_a_table_of_marks(tmp_path):
     [
         "DJI_0001.JPG,A,10.5,20.5,1.2\nDJI_0001.JPG,B,30,40.25,0.7\n",  # Pix4D's
         "A,DJI_0001.JPG,10.5,20.5\nB,DJI_0001.JPG,30,40.25\n",
+        "Marker label,Camera label,Pixel X,Pixel Y\nA,DJI_0001.JPG,10.5,20.5\nB,DJI_0001.JPG,30,40.25\n",
         "gcp;image;x;y\nA;DJI_0001.JPG;10,5;20,5\nB;DJI_0001.JPG;30;40,25\n",
         "\ufeffX\tY\tGCP\tImage\r\n10.5\t20.5\tA\tDJI_0001.JPG\r\n30\t40.25\tB\tDJI_0001.JPG\r\n",
         'gcp,image,x,y\nA,"DJI_0001.JPG","10,5","20,5"\nB,DJI_0001.JPG,30,40.25\n',
