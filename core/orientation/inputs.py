@@ -115,6 +115,8 @@ def _levelled(
     )
     told = []
     if plan.sign:
+        if not geoid:
+            told.append(f"GNSS heights were brought to those of {control.where} by PROJ's grid for its vertical CRS.")
         rise = plan.sign * (undulation(geoid, gnss.coordinates, crs) if geoid else np.asarray(rise))
         gnss = replace(gnss, coordinates=gnss.coordinates + np.stack([0 * rise, 0 * rise, rise], axis=1))
     elif geoid:

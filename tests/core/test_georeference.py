@@ -785,5 +785,18 @@ def test_a_vertical_crs_without_its_grid_leaves_gnss_heights_out_and_says_why(tm
         in scene.report()
     )
     assert run(replace(request, geoid="48")).alti_gnss == pytest.approx(0.0, abs=1e-3)
+    assert "PROJ's grid" not in scene.report()
     with pytest.raises(InputError, match="GCP_HEIGHTS is ellipsoidal but the CRS of gcps"):
         run(replace(request, gcp_heights="ellipsoidal"))
+
+
+def test_the_grid_of_a_vertical_crs_brings_gnss_to_the_control(tmp_path, monkeypatch):
+    """What PROJ makes of a real grid is tested with the heights; here one of 48 m stands in for it."""
+    scene = Scene(tmp_path, gnss_shift=(0, 0, 48.0), mark_noise=0.0)
+    monkeypatch.setattr(
+        "strandline.core.orientation.inputs.undulation_of_crs", lambda _crs, points, _of: np.full(len(points), 48.0)
+    )
+    request = scene.request(gnss=True, gnss_heights="ellipsoidal")
+    request = replace(request, gcps=replace(request.gcps, crs="EPSG:32631+5773"))
+    assert run(request).alti_gnss == pytest.approx(0.0, abs=1e-3)
+    assert "GNSS heights were brought to those of gcps by PROJ" in scene.report()
