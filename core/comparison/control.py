@@ -47,12 +47,15 @@ def raw_request(
     given = read_given(request)
     if given is None:
         return request
+    borrowed = request.crs or crs
+    if borrowed:
+        given = given.in_crs_of(borrowed)
     marks = list(marks_of_table(read_layer(marks_raw))) if marks_raw else _moved(given.marks, exposures)
     points, table = folder / "points.gpkg", folder / "marks.gpkg"
     _write(given, marks, points, table)
     return replace(
         request,
-        gcps=VectorSource(str(points), points.stem, given.crs or request.crs or crs),
+        gcps=VectorSource(str(points), points.stem, given.crs),
         marks=VectorSource(str(table), table.stem),
         gcp_file=None,
         name_field="name",
