@@ -16,12 +16,23 @@ _FILE = "georef.json"
 
 
 @dataclass(frozen=True)
+class CalibratedCamera:
+    """An adjusted interior orientation: its parameters by COLMAP's names, and their covariance row by row."""
+
+    label: str
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    covariance: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Georef:
     """The local frame of the georeferenced block.
 
     ``similarity`` holds scale, the rotation's nine numbers row by row, and the shift: ``x_local = s R x_model + t``.
-    ``covariance`` (7x7, row by row: shift E N U in m, rotations about E N U in rad, scale; about the block's ``pivot`` in
-    the local frame) is the georeferencing's own uncertainty, common to all that is measured in the block; empty when not known.
+    ``covariance`` (10x10, row by row: shift E N U in m, rotations about E N U in rad, scale, and the height's terms in E^2, E N
+    and N^2 in 1/m; about the block's ``pivot`` in the local frame) is the georeferencing's own uncertainty, common to all that is
+    measured in the block; empty when not known. ``cameras`` are those of an adjustment, to calibrate another flight.
     ``accuracy`` repeats the step's numbers by name. ``heights`` says what the block's heights stand on: "ellipsoidal",
     "orthometric" or "unknown".
     """
@@ -33,6 +44,7 @@ class Georef:
     covariance: tuple[float, ...] = ()
     accuracy: dict[str, float | None] = field(default_factory=dict)
     heights: str = "unknown"
+    cameras: tuple[CalibratedCamera, ...] = ()
 
     @classmethod
     def read(cls, survey: Survey) -> Georef:

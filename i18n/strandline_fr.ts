@@ -1092,6 +1092,18 @@
    <translation>Précision GNSS en altimétrie (m)</translation>
   </message>
   <message>
+   <source>Accuracy of ground points in plan (m)</source>
+   <translation>Précision des points au sol en planimétrie (m)</translation>
+  </message>
+  <message>
+   <source>Of their survey.</source>
+   <translation>De leur lever.</translation>
+  </message>
+  <message>
+   <source>Accuracy of ground points in height (m)</source>
+   <translation>Précision des points au sol en altitude (m)</translation>
+  </message>
+  <message>
    <source>Targets laid out as control points.</source>
    <translation>Cibles posées comme points d'appui.</translation>
   </message>

@@ -3,20 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..errors import InputError
+from ..georef import FOLDER, Georef
 from ..survey import Photograph, Survey
 from .sparse import read_block
 
 MODEL = "model"  # the folder of a survey's sparse model in its free frame
 
 
-def read_calibration(folder: str, photographs: Sequence[Photograph]) -> Mapping[str, Camera]:
-    """Return the cameras of the oriented survey in ``folder``, by the names of ``photographs`` they fit.
+@dataclass(frozen=True)
+class Calibration:
+    """A camera of another survey, and the covariance (q, q) of its model's parameters where an adjustment gave one."""
 
-    A camera fits a photograph of the same camera group and size.
+    camera: Camera
+    covariance: NDArray[np.float64] | None = None
+
+
+def read_calibration(folder: str, photographs: Sequence[Photograph]) -> Mapping[str, Calibration]:
+    """Return the cameras of the survey in ``folder``, by the names of ``photographs`` they fit.
+
+    A camera fits a photograph of the same camera group and size. A survey that was georeferenced by adjustment has calibrated its
+    cameras on the ground; else those of its orientation are taken.
 
     Raises
     ------
@@ -26,7 +40,20 @@ def read_calibration(folder: str, photographs: Sequence[Photograph]) -> Mapping[
     other = Survey.open(folder)
     other.require("orient")
     group_of = {p.name: (p.camera, p.width, p.height) for p in other.photographs}
-    known = {group_of[view.name]: view.camera for view in read_block(Path(folder) / MODEL).views if view.name in group_of}
+    record = other.record("georeference")
+    covariances: dict[str, NDArray[np.float64]] = {}
+    source = MODEL
+    if record is not None and not other.is_stale("georeference"):
+        georef = Georef.read(other)
+        if georef.method == "adjustment":
+            source = FOLDER
+            covariances = {c.label: np.reshape(c.covariance, (len(c.names),) * 2) for c in georef.cameras}
+    views = read_block(Path(folder) / source).views
+    known = {
+        group: Calibration(view.camera, covariances.get(f"camera {group[0]}"))
+        for view in views
+        if (group := group_of.get(view.name))
+    }
     missing = sorted({p.camera for p in photographs if (p.camera, p.width, p.height) not in known})
     if missing:
         raise InputError(

@@ -9,8 +9,7 @@ import numpy as np
 from ..block import Block
 from .accuracy import Doming
 from .blunders import TOO_FEW_TO_TELL, Blunder
-from .observations import Seen
-from .solution import FOCAL_ASTRAY, Solution
+from .solution import FOCAL_ASTRAY, Solution, WrongMark
 
 if TYPE_CHECKING:
     from .georeference import Result
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
 
 _EDGE_WARNING = 3.0  # times the sigma amid the control; beyond it lies what control at the edges would mend
 _EDGE_MATTERS = 2.0  # ground pixels: about what a single height from five photographs is uncertain by
+_HEIGHT_MATTERS = 1.5  # ground pixels: less is what RTK gives at best
 _WELL_SEEN = 3  # rays of a tie point
 _SAMPLE = 5000  # tie points, enough for a percentile
 _NARROW = np.radians(2.0)
@@ -32,7 +32,8 @@ def verdict(solution: Solution, result: Result) -> str:
         counts.append(_points(result.control_count, "control point"))
     if "GNSS" in solution.based_on:
         counts.append(f"the GNSS positions of {_points(len(solution.gnss_errors), 'photograph')}")
-    text = f"Georeferenced by a similarity on {' and '.join(counts)}"
+    how = "a bundle adjustment" if solution.method == "adjustment" else "a similarity"
+    text = f"Georeferenced by {how} on {' and '.join(counts)}"
     if result.plani_check is not None:
         text += f"; {_points(result.check_count, 'check point')}, off by {_pair(result.plani_check, result.alti_check)}"
     elif result.plani_loo is not None:
@@ -41,15 +42,17 @@ def verdict(solution: Solution, result: Result) -> str:
         text += f"; the control points themselves are off by {_pair(result.plani_control, result.alti_control)}"
     elif result.plani_gnss is not None:
         text += f"; they are off by {_pair(result.plani_gnss, result.alti_gnss)}, and no independent point checks the result"
-    if solution.blunders:
-        text += f"; suspicious: {', '.join(dict.fromkeys(b.name for b in solution.blunders))}"
+    suspicious = [b.name for b in solution.blunders] + [f"{m.gcp} in {m.image}" for m in solution.wrong_marks]
+    if suspicious:
+        text += f"; suspicious: {', '.join(dict.fromkeys(suspicious))}"
     return text + "."
 
 
-def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | None) -> list[str]:
+def findings(solution: Solution, inputs: Inputs, dome: Doming | None) -> list[str]:
     """Return what the analyst must know before using the result, a sentence each."""
-    told = list(inputs.warnings)
-    told += [_blunder_sentence(b, solution.seen) for b in solution.blunders]
+    told = [*inputs.warnings, *solution.notes]
+    told += [_blunder_sentence(b, solution) for b in solution.blunders]
+    told += [_mark_sentence(m) for m in solution.wrong_marks]
     told += [
         f"The GNSS position of {b.name} is off by {b.error:.3g} m in {_where(b)}, {b.ratio:.1f} times its sigma: "
         "it has little weight."
@@ -61,17 +64,18 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
             few = f"it has {seen.marks} mark{'s' * (seen.marks != 1)} in oriented photographs, and needs two"
             told.append(f"{name} is not used: {few if seen.marks < 2 else 'its marks do not meet in a point; check them'}.")
             continue
-        if seen.wrong:
+        if seen.wrong and solution.method == "similarity":
             told.append(f"The mark of {name} in {', '.join(seen.wrong)} contradicts its other marks and is left out: check it.")
-        elif not seen.found.agree:
+        elif not seen.found.agree and solution.method == "similarity":
             worst = float(np.linalg.norm(seen.found.residuals, axis=1).max())
             told.append(f"The marks of {name} do not agree with each other (up to {worst:.1f} px): check them.")
         if seen.found.angle < _NARROW:
             degrees = np.degrees(seen.found.angle)
             told.append(f"The rays to {name} meet at {degrees:.1f} degrees only, which leaves its height uncertain.")
     told += _factor_sentences(solution)
-    middle, edge = predicted(solution, block)
-    matters = _EDGE_MATTERS * ground_pixel(block, solution.fit.similarity.scale)
+    middle, edge = predicted(solution)
+    told += _height_sentence(solution, middle[1], edge[1])
+    matters = _EDGE_MATTERS * ground_pixel(solution.block)
     if any(e > max(_EDGE_WARNING * m, matters) for m, e in zip(middle, edge, strict=True)):
         told.append(
             "The georeferencing is weak away from its points: sigma at the edge of the ground that "
@@ -110,35 +114,36 @@ def findings(solution: Solution, inputs: Inputs, block: Block, dome: Doming | No
     return told
 
 
-def predicted(solution: Solution, block: Block) -> tuple[tuple[float, float], tuple[float, float]]:
+def predicted(solution: Solution) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the georeferencing's predicted sigmas (plan, height; m) amid its control, and at the edge of the well-seen ground.
 
     The ground ends where the tie points of three photographs or more end: a footprint reaches far beyond, where nothing is
     measured. The edge stands for the two per cent of them that are known worst.
     """
+    block = solution.block
     well = block.points[block.rays >= _WELL_SEEN] if np.any(block.rays >= _WELL_SEEN) else block.points
-    ground = solution.fit.similarity.apply(well[:: max(1, len(well) // _SAMPLE)])
-    middle = np.array([*solution.fit.pivot[:2], np.median(ground[:, 2])])
-    covariance = solution.fit.uncertainty(np.concatenate([middle[None], ground]))
+    ground = well[:: max(1, len(well) // _SAMPLE)]
+    middle = np.array([*solution.common.pivot[:2], np.median(ground[:, 2])])
+    covariance = solution.common.uncertainty(np.concatenate([middle[None], ground]))
     plan = np.sqrt(covariance[:, 0, 0] + covariance[:, 1, 1])
     height = np.sqrt(covariance[:, 2, 2])
     edge = float(np.percentile(plan[1:], 98)), float(np.percentile(height[1:], 98))
     return (float(plan[0]), float(height[0])), edge
 
 
-def ground_pixel(block: Block, scale: float) -> float:
-    """Return the median size of a pixel on the ground (m)."""
+def ground_pixel(block: Block) -> float:
+    """Return the median size of a pixel on the ground, in the block's units."""
     sizes = []
     for index, view in enumerate(block.views):
         points = block.points[block.observed_point[block.observed_view == index]]
         if len(points):
             depth = np.median(points @ view.rotation[2] + view.translation[2])
-            sizes.append(scale * float(depth) / view.camera.brown()[0])
+            sizes.append(float(depth) / view.camera.brown()[0])
     return float(np.median(sizes))
 
 
 def _factor_sentences(solution: Solution) -> list[str]:
-    factor = solution.fit.estimated_factor
+    factor = solution.estimated_factor
     if solution.based_on == "GNSS" or factor is None or factor < 9.0:
         return []
     return [
@@ -147,13 +152,37 @@ def _factor_sentences(solution: Solution) -> list[str]:
     ]
 
 
-def _blunder_sentence(blunder: Blunder, seen: tuple[Seen, ...]) -> str:
+def _height_sentence(solution: Solution, middle: float, edge: float) -> list[str]:
+    """Say it when nothing on the ground holds the heights of an adjustment, and what they are then known to."""
+    if solution.method == "similarity" or solution.based_on != "GNSS":
+        return []
+    if middle < _HEIGHT_MATTERS * ground_pixel(solution.block):
+        return []
+    held = any(camera.origin == "held" for camera in solution.cameras)
+    what = "the GNSS positions alone" if held else "GNSS positions and the focal length that the photographs tell"
+    return [
+        f"Without control points heights rest on {what}, and are known to {_metres(middle)} (sigma) in the middle of the block "
+        f"and {_metres(edge)} at its edge; one control point, the CALIBRATION of a survey with control points, or tilted "
+        "photographs make them better."
+    ]
+
+
+def _mark_sentence(mark: WrongMark) -> str:
+    times = f", {mark.ratio:.1f} times its sigma" if np.isfinite(mark.ratio) else ""
+    return (
+        f"The mark of {mark.gcp} in {mark.image} is off by {mark.error:.1f} px{times}: it is kept with next to no weight; "
+        "correct it or remove it."
+    )
+
+
+def _blunder_sentence(blunder: Blunder, solution: Solution) -> str:
+    seen = solution.seen
     check = any(s.point.name == blunder.name and s.point.check for s in seen)
     control = sum(not s.point.check and s.found is not None for s in seen)
     text = f"{blunder.name} is off by {blunder.error:.3g} m in {_where(blunder)}, {blunder.ratio:.1f} times its predicted sigma: "
     if check:
         return text + "check its coordinates and marks."
-    if control <= TOO_FEW_TO_TELL:
+    if solution.method == "similarity" and control <= TOO_FEW_TO_TELL:
         return text + f"with {control} control points it could be another of them; check the coordinates and marks of all."
     return text + "it is kept with next to no weight; check its coordinates and marks."
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import cv2  # noqa: F401 - before pycolmap, whose PNG library otherwise crashes OpenCV's
@@ -11,27 +11,32 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from ..block import Block
+from ..block import Block, View
+from ..camera import Camera
 from ..contract import VectorSource, encode
 from ..errors import InputError, NotEnoughData
 from ..files import digest, whole
 from ..frames import LocalFrame
-from ..georef import FOLDER, Georef
+from ..georef import FOLDER, CalibratedCamera, Georef
 from ..progress import SILENT, Progress
 from ..survey import Survey, held
 from ..vector import check_destination
-from . import georeport
+from . import georeport, interior
 from .accuracy import Doming, alti, doming, plani
+from .adjustedsolution import solve_adjustment
+from .assembly import assemble, write_back
+from .calibration import read_calibration
 from .findings import findings, ground_pixel, verdict
+from .ignoring import outside
 from .inputs import Inputs, gather, read_given
 from .observations import Seen, find_marks
-from .similarity import Similarity
 from .solution import Solution, place, solve
 from .sparse import block_from_model, read_model
 
 Array = NDArray[np.float64]
 
 STEP = "georeference"
+VERSION = 2  # raise it when the same input would give another result
 
 
 @dataclass(frozen=True)
@@ -56,7 +61,7 @@ class Request:
     gcp_file: str | None = None
     check: str | None = None
     sigma_mark: float = 0.5
-    method: Literal["adjustment", "similarity"] = "similarity"
+    method: Literal["adjustment", "similarity"] = "adjustment"
     use_gnss: bool = True
     lever_arm: str | None = None
     gcp_heights: Literal["ellipsoidal", "orthometric", "unknown"] = "unknown"
@@ -113,19 +118,25 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         inputs = gather(request, survey, given, block)
         fingerprint = _fingerprint(request, inputs, oriented.fingerprint)
         solution = _solve(block, inputs, request.sigma_mark)
-        progress.at(0.6)
-        result, dome = _result(request, solution, inputs, block)
+        usable = np.ones(len(block.points), bool)
+        if inputs.ignore is not None:
+            usable = outside(solution, inputs.ignore)
+        if request.method == "adjustment":
+            solution = _adjusted(request, survey, model, block, inputs, solution, usable, progress.part(0.4, 0.75))
+        else:
+            solution = replace(solution, block=keep_points(solution.block, usable), kept=usable)
+        result, dome = _result(request, solution, inputs)
         georef = _georef(solution, inputs, result)
-        told = findings(solution, inputs, block, dome)
+        told = findings(solution, inputs, dome)
         for text in told:
             progress.warn(text)
         standing = survey.record(STEP)
         if standing is None or standing.fingerprint != fingerprint or survey.is_stale(STEP) or not _complete(survey):
-            write_transformed(model, solution.fit.similarity, survey)
+            write_georeferenced(model, solution, survey)
             georef.write(survey)
         progress.at(0.8)
-        georeport.write_layers(request.residuals, request.photos, solution, inputs, block)
-        report = georeport.report(solution, inputs, result, block, dome, told)
+        georeport.write_layers(request.residuals, request.photos, solution, inputs)
+        report = georeport.report(solution, inputs, result, dome, told)
         report.save(survey.report_path(STEP), request.output_html_file)
         survey.finish(
             STEP,
@@ -139,10 +150,12 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     return result
 
 
-def write_transformed(model: pycolmap.Reconstruction, similarity: Similarity, survey: Survey) -> None:
-    """Write ``model``, moved by the similarity, as the survey's georeferenced model; ids stay. ``model`` is moved in place."""
+def write_georeferenced(model: pycolmap.Reconstruction, solution: Solution, survey: Survey) -> None:
+    """Write ``model``, brought to the solution, as the survey's georeferenced model; ids stay. ``model`` is changed in place."""
+    similarity = solution.similarity
     turn = pycolmap.Rotation3d(similarity.rotation)
     model.transform(pycolmap.Sim3d(similarity.scale, turn, similarity.shift))
+    write_back(model, solution.block, solution.kept)
     # A kill from there to finish() leaves a survey that is not georeferenced, never one whose two files disagree.
     with whole(survey.folder / FOLDER, before=lambda: survey.forget(STEP)) as part:
         part.mkdir()
@@ -157,8 +170,6 @@ def check_parameters(request: Request) -> None:
     InputError
         When there are any.
     """
-    if request.method == "adjustment":
-        raise InputError("METHOD=adjustment is not available yet: use METHOD=similarity.")
     if request.gcp_file and (request.gcps or request.marks):
         raise InputError("GCP_FILE takes the place of GCPS and MARKS: give either the file or the two layers.")
     if (request.gcps is None) != (request.marks is None):
@@ -179,7 +190,8 @@ def _fingerprint(request: Request, inputs: Inputs, oriented: str) -> str:
         for p in inputs.control.points
     ]
     positions = [a.tolist() for a in (inputs.gnss.view, inputs.gnss.coordinates, inputs.gnss.sigmas, inputs.gnss.lever)]
-    return digest(oriented, request.method, request.sigma_mark, inputs.crs, points, positions, inputs.heights)
+    ignored = None if inputs.ignore is None else inputs.ignore.wkb
+    return digest(VERSION, oriented, request.method, request.sigma_mark, inputs.crs, points, positions, inputs.heights, ignored)
 
 
 def _solve(block: Block, inputs: Inputs, sigma_mark: float) -> Solution:
@@ -196,6 +208,86 @@ def _solve(block: Block, inputs: Inputs, sigma_mark: float) -> Solution:
     return solve(block, seen, inputs.gnss, frame=frame, comparable=inputs.heights.comparable, focal_change=inputs.focal_change)
 
 
+def _adjusted(
+    request: Request,
+    survey: Survey,
+    model: pycolmap.Reconstruction,
+    block: Block,
+    inputs: Inputs,
+    start: Solution,
+    usable: NDArray[np.bool_],
+    progress: Progress,
+) -> Solution:
+    """Return the adjustment from the similarity ``start``; points that it puts into IGNORE leave it, and it is done again."""
+    assembly = assemble(model, block)
+    interiors, labels = _interiors(survey, assembly.cameras_by_id(), dict(zip(assembly.camera_ids, block.views, strict=True)))
+    rounds = 0
+
+    def step() -> None:
+        nonlocal rounds
+        rounds += 1
+        progress.at(1.0 - 0.9**rounds)
+
+    def solved(points: NDArray[np.bool_], compare: bool) -> Solution:
+        return solve_adjustment(
+            assembly,
+            start,
+            inputs.gnss,
+            interiors,
+            sigma_mark=request.sigma_mark,
+            comparable=inputs.heights.comparable,
+            usable=points,
+            labels=labels,
+            compare=compare,
+            step=step,
+        )
+
+    if inputs.ignore is None:
+        return solved(usable, True)
+    first = solved(usable, False)
+    again = usable.copy()
+    again[first.kept] &= outside(first, inputs.ignore)
+    return solved(again, True)
+
+
+def _interiors(
+    survey: Survey, cameras: Mapping[int, Camera], views: Mapping[int, View]
+) -> tuple[dict[int, interior.Interior], dict[int, str]]:
+    """Return what is known of each camera (by id) before the adjustment, as the orientation knew it, and the cameras' labels."""
+    photographs = {p.name: p for p in survey.photographs}
+    standing = survey.require("orient").parameters
+    use, other = standing.get("calibration_use"), standing.get("calibration")
+    # Held cameras stand in the model as they are; only a prior needs the other survey again.
+    known = read_calibration(other, survey.photographs) if other and use == "prior" else {}
+    interiors, labels = {}, {}
+    for key, camera in cameras.items():
+        photo = photographs[views[key].name]
+        labels[key] = f"camera {photo.camera}" if photo.camera else f"camera {key}"
+        if use == "fixed":
+            interiors[key] = interior.held()
+        elif photo.name in known:
+            interiors[key] = interior.calibrated(camera, known[photo.name].camera, known[photo.name].covariance)
+        else:
+            interiors[key] = interior.free(camera, interior.file_focal(photo.focal))
+    return interiors, labels
+
+
+def keep_points(block: Block, kept: NDArray[np.bool_]) -> Block:
+    """Return the block with some of its points (n,) only."""
+    if kept.all():
+        return block
+    seen = kept[block.observed_point]
+    number = (np.cumsum(kept) - 1).astype(np.int32)
+    return Block(
+        block.views,
+        block.points[kept],
+        block.errors[kept],
+        block.rays[kept],
+        number[block.observed_point[seen]],
+        block.observed_view[seen],
+    )
+
+
 def _enough(seen: Sequence[Seen], inputs: Inputs) -> None:
     control = [s for s in seen if not s.point.check]
     if control and all(s.found is None for s in control):
@@ -205,13 +297,13 @@ def _enough(seen: Sequence[Seen], inputs: Inputs) -> None:
         )
 
 
-def _result(request: Request, solution: Solution, inputs: Inputs, block: Block) -> tuple[Result, Doming | None]:
+def _result(request: Request, solution: Solution, inputs: Inputs) -> tuple[Result, Doming | None]:
     found = np.array([s.found is not None for s in solution.seen], bool)
     check = np.array([s.point.check for s in solution.seen], bool)
     control, checks = solution.errors[found & ~check], solution.errors[found & check]
     loo = solution.loo[np.isfinite(solution.loo[:, 0])]
     gnss_alti = alti(solution.gnss_errors) if inputs.heights.comparable else None
-    dome = _doming(solution, inputs, block)
+    dome = _doming(solution, inputs)
     result = Result(
         request.survey,
         len(control),
@@ -229,33 +321,44 @@ def _result(request: Request, solution: Solution, inputs: Inputs, block: Block) 
     return result, dome
 
 
-def _doming(solution: Solution, inputs: Inputs, block: Block) -> Doming | None:
+def _doming(solution: Solution, inputs: Inputs) -> Doming | None:
     """Test for a dome on the errors of control and check points, or with too few of them on GNSS heights.
 
-    The worst blunder in height is left out: one in the middle looks like a dome. Others stay, for a dome makes blunders of many.
+    An adjustment bends towards its control points: there their errors when left out take the place of their residuals. The worst
+    blunder in height is left out: one in the middle looks like a dome. Others stay, for a dome makes blunders of many.
     """
-    limit = ground_pixel(block, solution.fit.similarity.scale)
+    limit = ground_pixel(solution.block)
     worst = max((b for b in solution.blunders if b.part == "height"), key=lambda b: b.ratio, default=None)
     used = np.array([s.found is not None and (worst is None or s.point.name != worst.name) for s in solution.seen], bool)
     places = np.array([s.point.coordinates for s in solution.seen], float).reshape(-1, 3)[:, :2]
-    dome = doming(places[used], solution.errors[used, 2], solution.sigmas[used, 2], limit)
+    heights, sigmas = solution.errors[:, 2], solution.sigmas[:, 2]
+    if solution.method == "adjustment":
+        left_out = np.isfinite(solution.loo[:, 2])
+        heights = np.where(left_out, solution.loo[:, 2], heights)
+        sigmas = np.where(left_out, solution.loo_sigma[:, 2], sigmas)
+    dome = doming(places[used], heights[used], sigmas[used], limit)
     if dome is None and len(inputs.gnss):
-        sigmas = inputs.gnss.sigmas[:, 1] if inputs.gnss.declared else None
-        dome = doming(inputs.gnss.coordinates[:, :2], solution.gnss_errors[:, 2], sigmas, limit)
+        declared = inputs.gnss.sigmas[:, 1] if inputs.gnss.declared else None
+        dome = doming(inputs.gnss.coordinates[:, :2], solution.gnss_errors[:, 2], declared, limit)
     return dome
 
 
 def _georef(solution: Solution, inputs: Inputs, result: Result) -> Georef:
-    similarity = solution.fit.similarity
+    similarity = solution.similarity
     numbers: dict[str, Any] = {k: v for k, v in encode(result).items() if k != "output"}
     return Georef(
         solution.frame,
-        "similarity",
+        solution.method,
         (similarity.scale, *map(float, similarity.rotation.ravel()), *map(float, similarity.shift)),
-        tuple(map(float, solution.fit.pivot)),
-        tuple(map(float, solution.fit.covariance.ravel())),
+        tuple(map(float, solution.common.pivot)),
+        tuple(map(float, solution.common.covariance.ravel())),
         numbers,
         inputs.heights.kind,
+        tuple(
+            CalibratedCamera(c.label, c.names, tuple(map(float, c.values)), tuple(map(float, c.covariance.ravel())))
+            for c in solution.cameras
+            if c.names
+        ),
     )
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ..block import Block
 from ..report.html import Report, new_figure
 from ..vector import write_layer
+from . import adjustmentreport
 from .accuracy import Doming
 from .findings import predicted, verdict
 from .observations import Seen
@@ -30,12 +30,12 @@ _CAPTION = (
 )
 
 
-def report(solution: Solution, inputs: Inputs, result: Result, block: Block, dome: Doming | None, told: list[str]) -> Report:
+def report(solution: Solution, inputs: Inputs, result: Result, dome: Doming | None, told: list[str]) -> Report:
     """Return the report page; ``told`` are the findings."""
     page = Report("Georeference", verdict(solution, result))
     for text in told:
         page.warning(text)
-    middle, edge = predicted(solution, block)
+    middle, edge = predicted(solution)
     page.heading("Accuracy")
     page.table(
         ["", "points", "plan (m)", "height (m)"],
@@ -62,7 +62,7 @@ def report(solution: Solution, inputs: Inputs, result: Result, block: Block, dom
         )
     if solution.seen or len(inputs.gnss):
         page.heading("Residuals")
-        page.figure(_map(solution, inputs, block), _CAPTION)
+        page.figure(_map(solution, inputs), _CAPTION)
     if solution.seen:
         page.table(
             [
@@ -81,15 +81,17 @@ def report(solution: Solution, inputs: Inputs, result: Result, block: Block, dom
         )
     if len(inputs.gnss):
         page.heading("GNSS")
-        names = [block.views[i].name for i in inputs.gnss.view]
+        names = [solution.block.views[i].name for i in inputs.gnss.view]
         page.table(
             ["photograph", "dE (m)", "dN (m)", "dU (m)"],
             [[n, *map(float, e)] for n, e in zip(names, solution.gnss_errors, strict=True)],
         )
+    if solution.method == "adjustment":
+        adjustmentreport.add(page, solution)
     return page
 
 
-def write_layers(residuals: str | None, photos: str | None, solution: Solution, inputs: Inputs, block: Block) -> None:
+def write_layers(residuals: str | None, photos: str | None, solution: Solution, inputs: Inputs) -> None:
     """Write the residuals at the ground points' given places, and the projection centres, as GeoPackages in the CRS."""
     if residuals:
         write_layer(
@@ -101,11 +103,14 @@ def write_layers(residuals: str | None, photos: str | None, solution: Solution, 
             "Point Z",
         )
     if photos:
-        similarity = solution.fit.similarity
-        centres = solution.frame.to_crs(similarity.apply(np.array([v.centre for v in block.views])))
+        block = solution.block
+        centres = solution.frame.to_crs(np.array([v.centre for v in block.views]))
         errors = np.full((len(centres), 3), np.nan)
         errors[inputs.gnss.view] = solution.gnss_errors
         fields: dict[str, Any] = {"name": [v.name for v in block.views], "height": centres[:, 2], **_components(errors)}
+        if solution.centre_sigma is not None:
+            sigmas = solution.centre_sigma
+            fields |= {"sigma_h": np.hypot(sigmas[:, 0], sigmas[:, 1]) / np.sqrt(2), "sigma_v": sigmas[:, 2]}
         write_layer(photos, "photos", inputs.crs, fields, _points(list(centres)), "Point Z")
 
 
@@ -125,6 +130,8 @@ def _residual_fields(solution: Solution) -> dict[str, Any]:
         "loo_dN": solution.loo[:, 1],
         "loo_dU": solution.loo[:, 2],
         "marks_px": marks_px,
+        "loo_sigma_h": np.hypot(solution.loo_sigma[:, 0], solution.loo_sigma[:, 1]) / np.sqrt(2),
+        "loo_sigma_v": solution.loo_sigma[:, 2],
         "blunder": [s.point.name in blunders for s in seen],
     }
 
@@ -164,10 +171,11 @@ def _role(seen: Seen) -> str:
     return role if seen.found is not None else f"{role}, not used"
 
 
-def _map(solution: Solution, inputs: Inputs, block: Block) -> Figure:
+def _map(solution: Solution, inputs: Inputs) -> Figure:
     figure = new_figure(9.0, 7.0)
     axes = figure.add_subplot()
-    ground = solution.frame.to_crs(solution.fit.similarity.apply(block.points[:: max(1, len(block.points) // 4000)]))
+    block = solution.block
+    ground = solution.frame.to_crs(block.points[:: max(1, len(block.points) // 4000)])
     origin = ground.mean(axis=0)
     axes.plot(*(ground - origin)[:, :2].T, ",", color="#c9a45c", label="tie points")
     places = np.array([s.point.coordinates for s in solution.seen], float).reshape(-1, 3) - origin
@@ -205,12 +213,20 @@ def _round_down(value: float) -> float:
 
 
 def _basis(solution: Solution, inputs: Inputs) -> str:
+    if solution.method == "adjustment":
+        based = {
+            "control": "Tie points and control points were adjusted together.",
+            "control and GNSS": "Tie points, control points and GNSS positions were adjusted together, an error that all "
+            "positions share included.",
+            "GNSS": "Tie points and GNSS positions were adjusted together; there are no control points.",
+        }[solution.based_on]
+        return f"{based} Heights are {inputs.heights.kind}."
     based = {
         "control": "The similarity rests on the control points alone; GNSS positions are compared with it and do not enter it.",
         "control and GNSS": "The control points do not suffice: GNSS positions give shape and tilt, GCPs the level.",
         "GNSS": "There are no control points: the similarity rests on the GNSS positions of the projection centres.",
     }[solution.based_on]
-    return f"{based} Heights are {inputs.heights.kind}. Scale {solution.fit.similarity.scale:.6g} m per unit of the free frame."
+    return f"{based} Heights are {inputs.heights.kind}. Scale {solution.similarity.scale:.6g} m per unit of the free frame."
 
 
 def _rms_sigma(sigmas: Array) -> tuple[float | None, float | None]:

@@ -76,17 +76,24 @@ def gnss_of(views: Sequence[View], photographs: Sequence[Photograph], crs: str, 
 
 
 def antenna_offsets(views: Sequence[View], gnss: Gnss, similarity: Similarity) -> Array:
-    """Return the way from each projection centre to its antenna (n, 3) in the local frame.
+    """Return the way from each projection centre to its antenna (n, 3) in the local frame."""
+    turns = np.array([views[i].rotation @ similarity.rotation.T for i in gnss.view]).reshape(-1, 3, 3)
+    return offsets(turns, gnss.lever)
 
-    The flight frame stands upright; its forward is where the top of the photograph points.
+
+def offsets(rotation: Array, lever: Array) -> Array:
+    """Return the way from projection centre to antenna (n, 3) of cameras turned by ``rotation`` (n, 3, 3; camera from local).
+
+    ``lever`` (3,) is right, forward, up of the flight frame, which stands upright; its forward is where the photograph's top
+    points.
     """
-    if not gnss.lever.any():
-        return np.zeros((len(gnss), 3))
-    tops = np.array([similarity.rotation @ views[i].rotation.T @ [0.0, -1.0, 0.0] for i in gnss.view])
+    if not lever.any():
+        return np.zeros((len(rotation), 3))
+    tops = -rotation[:, 1, :]
     tops[:, 2] = 0.0
     forward = tops / np.linalg.norm(tops, axis=1)[:, None]
     right = np.stack([forward[:, 1], -forward[:, 0], np.zeros(len(forward))], axis=1)
-    return np.asarray(gnss.lever[0] * right + gnss.lever[1] * forward + gnss.lever[2] * np.array([0.0, 0.0, 1.0]))
+    return np.asarray(lever[0] * right + lever[1] * forward + lever[2] * np.array([0.0, 0.0, 1.0]))
 
 
 def _lever(text: str | None) -> Array:

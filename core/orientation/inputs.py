@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from ..block import Block
@@ -36,6 +37,7 @@ class Inputs:
     heights: HeightPlan
     focal_change: float
     warnings: tuple[str, ...]
+    ignore: shapely.Geometry | None = None
 
 
 def read_given(request: Request) -> Given | None:
@@ -88,10 +90,8 @@ def gather(request: Request, survey: Survey, given: Given | None, block: Block) 
     if plan.comparable:
         plan, told = _compared(plan, (stated, request.gnss_heights), control, gnss, block, survey)
         warnings += told
-    if request.ignore is not None:
-        polygons(request.ignore, crs)
-        warnings.append("IGNORE has no effect on a similarity, which uses no tie points.")
-    return Inputs(crs, control, gnss, plan, _focal_change(survey, block), tuple(warnings))
+    ignore = shapely.union_all(polygons(request.ignore, crs)) if request.ignore is not None else None
+    return Inputs(crs, control, gnss, plan, _focal_change(survey, block), tuple(warnings), ignore)
 
 
 def _levelled(

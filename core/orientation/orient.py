@@ -85,7 +85,8 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     with held(request.survey, "orient"):
         survey = Survey.open(request.survey)
         standing = survey.require("tiepoints")
-        known = read_calibration(request.calibration, survey.photographs) if request.calibration else {}
+        found = read_calibration(request.calibration, survey.photographs) if request.calibration else {}
+        known = {name: calibration.camera for name, calibration in found.items()}
         parameters = {
             "camera_model": request.camera_model,
             "calibration": request.calibration,

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
+from ..block import Block, View
 from ..errors import InputError, NotEnoughData
 from ..frames import LocalFrame
 from .blunders import TOO_FEW_TO_TELL, Blunder, distrust, wrong_checks, wrong_control, wrong_positions
+from .common import Common, rigid
 from .gnss import Gnss
 from .observations import Seen, Solver, undetermined
 from .similarity import Fit, Similarity
@@ -22,17 +24,67 @@ FOCAL_ASTRAY = 0.05  # focal lengths in EXIF are good to a few per cent
 
 
 @dataclass(frozen=True)
+class WrongMark:
+    """A mark that the rest contradicts: by how many pixels, and by how many of its sigmas."""
+
+    gcp: str
+    image: str
+    error: float
+    ratio: float
+
+
+@dataclass(frozen=True)
+class AdjustedCamera:
+    """An adjusted interior orientation: parameters by name with their value and sigmas, known beforehand and adjusted.
+
+    ``origin`` says what they were known from: "files", "calibration", "nothing", or "held" for one that was not adjusted.
+    """
+
+    label: str
+    origin: str
+    names: tuple[str, ...]
+    values: Array
+    before: Array
+    sigma: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """What a method gives with ``control`` control points: RMS errors of check points and predicted ones (m); None for none."""
+
+    method: str
+    control: int
+    names: tuple[str, ...]
+    plani: float | None
+    alti: float | None
+    predicted_plani: float | None
+    predicted_alti: float | None
+
+
+@dataclass(frozen=True)
 class Solution:
     """The solved georeferencing.
 
-    ``based_on`` is "control", "control and GNSS" or "GNSS". Arrays follow ``seen`` (n) and the GNSS positions (g); errors are
-    computed minus given in easting, northing, height of the CRS, NaN where there is none, ``sigmas`` (n, 3) those that
-    surveying and marks give them. ``loo`` are leave-one-out errors of the control points, ``loo_sigma`` their predicted sigmas.
-    ``height_doubt`` (m) is what the focal length adds to the heights' sigma when no control point holds them.
+    ``similarity`` leads from the free frame to the local one, ``block`` is in the local frame and has the points ``kept`` (p,) of
+    the sparse model; ``common`` is the error that all of it shares. ``based_on`` is "control", "control and GNSS" or "GNSS".
+    Arrays follow ``seen`` (n) and the GNSS positions (g); errors are computed minus given in easting, northing, height of the
+    CRS, NaN where there is none, ``sigmas`` (n, 3) those that surveying and marks give them. ``loo`` are leave-one-out errors of
+    the control points, ``loo_sigma`` their predicted sigmas. ``height_doubt`` (m) is what the focal length adds to a similarity's
+    heights when no control point holds them. ``estimated_factor`` is the variance factor of the control points, None when it is
+    not known.
+
+    Of an adjustment: ``wrong_marks``; ``notes`` in sentences; ``cameras``; ``pixel_sigma`` of tie points; ``centre_sigma``
+    (views, 3) of projection centres; ``tie_sigma`` (3,), the median of tie points' own in E, N, U; and what ``alternatives``
+    would have given.
     """
 
+    method: Literal["similarity", "adjustment"]
     frame: LocalFrame
-    fit: Fit
+    similarity: Similarity
+    block: Block
+    kept: NDArray[np.bool_]
+    common: Common
     based_on: str
     seen: tuple[Seen, ...]
     errors: Array
@@ -42,7 +94,25 @@ class Solution:
     blunders: tuple[Blunder, ...]
     gnss_errors: Array
     gnss_blunders: tuple[Blunder, ...]
-    height_doubt: float
+    height_doubt: float = 0.0
+    estimated_factor: float | None = None
+    wrong_marks: tuple[WrongMark, ...] = ()
+    notes: tuple[str, ...] = ()
+    cameras: tuple[AdjustedCamera, ...] = ()
+    pixel_sigma: float | None = None
+    centre_sigma: Array | None = None
+    tie_sigma: Array | None = None
+    alternatives: tuple[Alternative, ...] = ()
+
+
+def moved(block: Block, similarity: Similarity) -> Block:
+    """Return the block after the similarity."""
+    views = []
+    for view in block.views:
+        rotation = view.rotation @ similarity.rotation.T
+        views.append(View(view.name, view.camera, rotation, -rotation @ similarity.apply(view.centre[None])[0]))
+    points = similarity.apply(block.points)
+    return Block(tuple(views), points, block.errors, block.rays, block.observed_point, block.observed_view)
 
 
 def place(block: Block, seen: tuple[Seen, ...], gnss: Gnss, frame: LocalFrame) -> Similarity:
@@ -95,13 +165,15 @@ def solve(
     suspicious = wrong_positions(solver, solved) if with_gnss else []
     doubt = 0.0 if used.any() else _height_doubt(block, solved, focal_change)
     errors = solver.errors(solved)
-    if doubt > 0:
-        covariance = solved.covariance.copy()
-        covariance[2, 2] += doubt**2
-        solved = replace(solved, covariance=covariance)
+    covariance = solved.covariance.copy()
+    covariance[2, 2] += doubt**2
     return Solution(
+        "similarity",
         frame,
-        solved,
+        solved.similarity,
+        moved(block, solved.similarity),
+        np.ones(len(block.points), bool),
+        rigid(solved.pivot, covariance),
         based,
         seen,
         errors,
@@ -112,6 +184,7 @@ def solve(
         gnss_errors,
         tuple(suspicious),
         doubt,
+        solved.estimated_factor,
     )
 
 

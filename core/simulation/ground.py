@@ -16,8 +16,6 @@ from .terrain import Beach
 Array = NDArray[np.float64]
 
 TARGET_PIXELS = 36  # side of a target in the photographs
-SIGMA_H, SIGMA_V = 0.01, 0.02  # m, of the measured coordinates
-SIGMA_MARK = 0.3  # px
 _STEEPEST = 0.25  # slope of ground a surveyor lays a target on
 _CANDIDATES = 3000
 
@@ -71,12 +69,12 @@ def lay_targets(beach: Beach, after: bool, control: int, check: int, side: float
     return Targets(names, roles, points, random.uniform(0, np.pi / 2, count))
 
 
-def measure(targets: Targets, placement: Placement, random: np.random.Generator) -> Array:
-    """Return the coordinates (n, 3) in the CRS as a surveyor finds them, with errors of ``SIGMA_H`` and ``SIGMA_V``."""
+def measure(targets: Targets, placement: Placement, sigma_h: float, sigma_v: float, random: np.random.Generator) -> Array:
+    """Return the coordinates (n, 3) in the CRS as a surveyor finds them, with errors of ``sigma_h`` and ``sigma_v`` (m)."""
     if not targets.names:
         return np.empty((0, 3))
     local = placement.to_local(targets.points)
-    return placement.frame.to_crs(local + np.array([SIGMA_H, SIGMA_H, SIGMA_V]) * random.standard_normal(local.shape))
+    return placement.frame.to_crs(local + np.array([sigma_h, sigma_h, sigma_v]) * random.standard_normal(local.shape))
 
 
 @dataclass(frozen=True)
@@ -89,8 +87,8 @@ class Mark:
     y: float
 
 
-def mark(targets: Targets, views: list[View], scene: Scene, random: np.random.Generator) -> list[Mark]:
-    """Return the marks of every target wholly in a photograph and not hidden, measured to ``SIGMA_MARK``."""
+def mark(targets: Targets, views: list[View], scene: Scene, sigma: float, random: np.random.Generator) -> list[Mark]:
+    """Return the marks of every target wholly in a photograph and not hidden, measured to ``sigma`` (px)."""
     marks = []
     for view in views:
         if not len(targets.points):
@@ -100,7 +98,7 @@ def mark(targets: Targets, views: list[View], scene: Scene, random: np.random.Ge
         edge = TARGET_PIXELS * 0.8
         with np.errstate(invalid="ignore"):
             inside = ((pixels > edge) & (pixels < (camera.width - edge, camera.height - edge))).all(axis=1)
-        errors = random.standard_normal(pixels.shape) * SIGMA_MARK
+        errors = random.standard_normal(pixels.shape) * sigma
         found = np.full_like(targets.points, np.inf)
         found[inside] = scene.hit(view, pixels[inside])
         hidden = np.linalg.norm(found - targets.points, axis=1) > 0.05

@@ -18,7 +18,7 @@ from ..camera import Camera
 from ..files import write_json
 from ..vector import write_layer
 from . import truth
-from .ground import SIGMA_H, SIGMA_V, Mark, Targets
+from .ground import Mark, Targets
 from .placement import Placement
 from .terrain import Beach
 
@@ -27,11 +27,17 @@ Array = NDArray[np.float64]
 _STAMP = "2024-01-01T00:00:00.000Z"  # a GeoPackage holds the time it was made; the same seed is to give the same bytes
 
 
-def write_ground(folder: Path, placement: Placement, targets: Targets, measured: Array, marks: list[Mark]) -> None:
-    """Write gcps.gpkg (with the coordinates ``measured`` (n, 3) in the CRS), marks.csv and gcp_list.txt."""
+def write_ground(
+    folder: Path, placement: Placement, targets: Targets, measured: Array, sigmas: tuple[float, float], marks: list[Mark]
+) -> None:
+    """Write gcps.gpkg (coordinates ``measured`` (n, 3) in the CRS, ``sigmas`` in plan and height), marks.csv, gcp_list.txt."""
     count = len(targets.names)
-    sigmas = {"sigma_h": [SIGMA_H] * count, "sigma_v": [SIGMA_V] * count}
-    fields: dict[str, list[Any]] = {"name": targets.names, "role": targets.roles, **sigmas}
+    fields: dict[str, list[Any]] = {
+        "name": targets.names,
+        "role": targets.roles,
+        "sigma_h": [sigmas[0]] * count,
+        "sigma_v": [sigmas[1]] * count,
+    }
     points = [shapely.Point(*point) for point in measured]
     write_layer(str(folder / "gcps.gpkg"), "gcps", placement.frame.crs, fields, points, "Point Z", modified=_STAMP)
     rows = [(m.gcp, m.image, f"{m.x:.3f}", f"{m.y:.3f}") for m in marks]
@@ -48,12 +54,23 @@ def write_ground(folder: Path, placement: Placement, targets: Targets, measured:
 
 
 def write_tables(
-    folder: Path, placement: Placement, camera: Camera, views: dict[str, list[View]], volumes: list[truth.Volumes], beach: Beach
+    folder: Path,
+    placement: Placement,
+    camera: Camera,
+    flights: dict[str, tuple[list[View], Targets]],
+    volumes: list[truth.Volumes],
+    beach: Beach,
 ) -> None:
-    """Write cameras.json (true poses in the local frame, by date) and, of two dates, volumes.json and volumes.csv."""
+    """Write cameras.json (true poses in the local frame), targets.csv (in the CRS), and of two dates volumes.json and .csv."""
     about = "x_camera = rotation (row by row) x_local + translation; local is east, north, up at the frame's origin"
-    poses = {day: [_pose(view, placement) for view in flown] for day, flown in views.items()}
+    poses = {day: [_pose(view, placement) for view in flown] for day, (flown, _) in flights.items()}
     write_json(folder / "cameras.json", {"about": about, "frame": placement.frame, "camera": camera, "views": poses})
+    targets = [
+        (day, name, *(f"{value:.4f}" for value in place))
+        for day, (_, laid) in flights.items()
+        for name, place in zip(laid.names, placement.to_crs(laid.points.reshape(-1, 3)), strict=True)
+    ]
+    _write_csv(folder / "targets.csv", ("date", "name", "x", "y", "z"), targets)
     if volumes:
         zones = [asdict(v) for v in volumes]
         write_json(folder / "volumes.json", {"unit": "m3", "zones": zones, "without_ripples": beach.changes()})

@@ -111,15 +111,16 @@ def produce(request: Request, beach: Beach, folder: Path, progress: Progress) ->
         pass
     for f, date in zip(fields, dates, strict=True):
         random = _random(request, date.number, _MARKS)
-        marks = ground.mark(date.targets, date.views, _scene(setting, date, f), random)
-        measured = ground.measure(date.targets, setting.placement, _random(request, date.number, _SURVEY))
-        outputs.write_ground(folder / date.day, setting.placement, date.targets, measured, marks)
+        marks = ground.mark(date.targets, date.views, _scene(setting, date, f), request.mark_sigma, random)
+        sigmas = request.gcp_sigma_h, request.gcp_sigma_v
+        measured = ground.measure(date.targets, setting.placement, *sigmas, _random(request, date.number, _SURVEY))
+        outputs.write_ground(folder / date.day, setting.placement, date.targets, measured, sigmas, marks)
         remove(Path(f.folder))
     (folder / "truth").mkdir()
     volumes = truth.write_truth(folder / "truth", setting.placement, beach, len(dates))
     progress.at(0.95)
-    views = {date.day: date.views for date in dates}
-    outputs.write_tables(folder / "truth", setting.placement, setting.camera, views, volumes, beach)
+    flights = {date.day: (date.views, date.targets) for date in dates}
+    outputs.write_tables(folder / "truth", setting.placement, setting.camera, flights, volumes, beach)
     outputs.write_polygons(folder, setting.placement, beach)
     sigma = precision_map(beach, dates[0].views)[2]
     write_report(

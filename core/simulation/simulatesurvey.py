@@ -14,7 +14,7 @@ from ..survey import held
 from .terrain import Beach
 
 _FILE = "simulation.json"
-_VERSION = 4  # of what the same parameters give
+_VERSION = 5  # of what the same parameters give
 _SIDECARS = (".aux.xml", "-wal", "-shm", "-journal", ".qmd", ".qml")  # what looking at the files may add
 
 
@@ -25,7 +25,7 @@ class Request:
     ``length`` is along the shore, ``width`` across it. ``height`` is that of the flight above the beach; ``tilt`` the standard
     deviation of the camera's tilt. ``crs`` is a projected CRS in metres. ``contrast`` is the standard deviation of the sand's
     reflectance relative to its mean over features from 2 cm to 3 m. ``noise`` scales shot and read noise (1 = a small drone
-    camera at base ISO, 0 = none).
+    camera at base ISO, 0 = none). ``mark_sigma`` (px) is of a ground point marked in a photograph.
     """
 
     output: str
@@ -44,6 +44,9 @@ class Request:
     noise: float = 1.0
     gnss_sigma_h: float = 0.03
     gnss_sigma_v: float = 0.05
+    gcp_sigma_h: float = 0.01
+    gcp_sigma_v: float = 0.02
+    mark_sigma: float = 0.3
     gcp_count: int = 6
     check_count: int = 4
     seed: int = 1
@@ -118,6 +121,9 @@ def _validate(r: Request) -> None:
         "NOISE": (r.noise, 0, 20, ""),
         "GNSS_SIGMA_H": (r.gnss_sigma_h, 0, 100, "m"),
         "GNSS_SIGMA_V": (r.gnss_sigma_v, 0, 100, "m"),
+        "GCP_SIGMA_H": (r.gcp_sigma_h, 0, 100, "m"),
+        "GCP_SIGMA_V": (r.gcp_sigma_v, 0, 100, "m"),
+        "MARK_SIGMA": (r.mark_sigma, 0, 100, "px"),
         "GCP_COUNT": (r.gcp_count, 0, 200, ""),
         "CHECK_COUNT": (r.check_count, 0, 200, ""),
         "SEED": (r.seed, 0, 10**9, ""),

@@ -436,7 +436,7 @@ def test_gnss_with_declared_sigmas_is_taken_at_its_word(tmp_path):
 
 def test_gnss_apart_from_control(tmp_path):
     scene = Scene(tmp_path, gnss_shift=(0.4, 0.3, 48.0), mark_noise=0.0)
-    result = run(scene.request(gnss=True))
+    result = run(scene.request(gnss=True, method="similarity"))
     assert np.abs(scene.errors()).max() < 1e-4  # GNSS did not enter
     assert result.plani_gnss == pytest.approx(0.5, abs=1e-3)
     assert result.alti_gnss is None  # heights of two kinds are not compared
@@ -774,7 +774,7 @@ def test_a_geoid_with_the_wrong_sign_is_told(tmp_path):
 
 def test_a_vertical_crs_without_its_grid_leaves_gnss_heights_out_and_says_why(tmp_path):
     scene = Scene(tmp_path, gnss_shift=(0, 0, 48.0), mark_noise=0.0)
-    request = scene.request(gnss=True, gnss_heights="ellipsoidal")
+    request = scene.request(gnss=True, gnss_heights="ellipsoidal", method="similarity")
     request = replace(request, gcps=replace(request.gcps, crs="EPSG:32631+5773"))  # EGM96 heights
     assert run(request).alti_gnss is None
     assert np.abs(scene.errors()).max() < 1e-4
@@ -796,7 +796,7 @@ def test_the_grid_of_a_vertical_crs_brings_gnss_to_the_control(tmp_path, monkeyp
     monkeypatch.setattr(
         "strandline.core.orientation.inputs.undulation_of_crs", lambda _crs, points, _of: np.full(len(points), 48.0)
     )
-    request = scene.request(gnss=True, gnss_heights="ellipsoidal")
+    request = scene.request(gnss=True, gnss_heights="ellipsoidal", method="similarity")
     request = replace(request, gcps=replace(request.gcps, crs="EPSG:32631+5773"))
     assert run(request).alti_gnss == pytest.approx(0.0, abs=1e-3)
     assert "GNSS heights were brought to those of gcps by PROJ" in scene.report()

@@ -48,6 +48,17 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
     return folder, run(dataclasses.replace(SMALL, output=str(folder)))
 
 
+def test_surveyed_points_err_by_their_sigmas(tmp_path: Path) -> None:
+    run(dataclasses.replace(TINY, output=str(tmp_path / "s"), gcp_count=4, gcp_sigma_h=0.5, gcp_sigma_v=0.0, mark_sigma=0.0))
+    with (tmp_path / "s" / "truth" / "targets.csv").open() as file:
+        true = np.array([[float(row[k]) for k in "xyz"] for row in csv.DictReader(file)])
+    layer = read_layer(VectorSource(str(tmp_path / "s" / DAYS[0] / "gcps.gpkg"), ""))
+    given = np.array([[p.x, p.y, p.z] for p in layer.geometry])
+    assert_allclose(given[:, 2], true[:, 2], atol=1e-3)  # half a metre aside, the ellipsoid bends by a hundredth of that
+    assert 0.2 < np.std(given[:, :2] - true[:, :2]) < 1.0
+    assert set(layer.fields["sigma_h"]) == {0.5}
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
@@ -63,7 +74,7 @@ def test_folder_holds_what_a_survey_needs(made: tuple[Path, Result]) -> None:
             n for n in names if n.startswith(f"{day}/raw/")
         }
         assert {f"{day}/gcps.gpkg", f"{day}/marks.csv", f"{day}/gcp_list.txt"} < names
-    truth = ("before_dsm.tif", "after_dsm.tif", "difference.tif", "volumes.json", "volumes.csv", "cameras.json")
+    truth = ("before_dsm.tif", "after_dsm.tif", "difference.tif", "volumes.json", "volumes.csv", "cameras.json", "targets.csv")
     assert {f"truth/{name}" for name in truth} < names
     assert {"zones.gpkg", "stable.gpkg", "simulation.json", "report/simulatesurvey.html"} < names
     assert not [n for n in names if "fields" in n or ".part" in n or n.endswith(".lock")]

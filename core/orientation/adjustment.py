@@ -1,0 +1,383 @@
+"""The bundle adjustment of tie points, ground control, GNSS positions and interior orientations, with its full covariance.
+
+Tie points and ground points are eliminated; what is solved for are poses, free interior parameters, and a constant error
+of the GNSS positions where there is one. A ground point observed at G with covariance S_G and marked in photographs gives the
+reduced observation ``r - Jp (G - X) = Ja da + e`` with ``Cov(e) = S_m + Jp S_G Jp^T``: what is left after its place is
+eliminated. Every covariance here is that of the whole adjustment, never one with other unknowns held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from ..errors import NotEnoughData
+from . import bundle
+from .bundle import POSE, Cameras, Rays
+from .gnss import offsets
+from .interior import Interior
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 40
+_WEIGHING = 6  # rounds after which the tie points' weights and sigma stand, so that the rest can settle
+_STILL = 1e-6  # m, and px at the image's edge: a change below which the adjustment stands
+_HUBER = 2.5  # sigmas of a tie point's 2D residual, or of a position's, beyond which it weighs less (Huber 1964)
+_LEAST_SIGMA = 1e-4  # px; keeps exact observations solvable
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """The marks of a ground point: ``view`` (m,), pixels ``xy`` (m, 2) and their sigma (m,) per axis."""
+
+    name: str
+    view: NDArray[np.int64]
+    xy: Array
+    sigma: Array
+
+
+@dataclass(frozen=True)
+class Control:
+    """A sighting of a point surveyed at ``ground`` (3,) of the local frame with ``covariance`` (3, 3)."""
+
+    sighting: Sighting
+    ground: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Positions:
+    """Antennas (g, 3) of the local frame in the views ``view`` (g,), with sigmas (g, 3), and the lever to them (3,).
+
+    ``shared`` (3,) is the prior sigma of an error that all have in common, inf for a free one, 0 for none.
+    """
+
+    view: NDArray[np.int64]
+    antenna: Array
+    sigma: Array
+    lever: Array
+    shared: Array
+
+    def __len__(self) -> int:
+        """Return the number of positions."""
+        return len(self.view)
+
+
+@dataclass(frozen=True)
+class Network:
+    """All that is adjusted: approximate cameras, what is known of their interiors, tie points (p, 3) and their rays."""
+
+    cameras: Cameras
+    interiors: tuple[Interior, ...]
+    ties: Rays
+    points: Array
+
+
+@dataclass(frozen=True)
+class Adjusted:
+    """An adjustment that stands.
+
+    ``places`` (k, 3) are the adjusted control points; ``bias`` (3,) the positions' common error; ``sigma`` the tie points'
+    sigma per axis (px), ``weight`` (m,) of their rays (px^-2). ``cofactor`` (u, u) is the covariance of the unknowns: poses,
+    interior parameters, bias.
+    """
+
+    network: Network
+    control: tuple[Control, ...]
+    positions: Positions
+    places: Array
+    bias: Array
+    sigma: float
+    weight: Array
+    cofactor: Array
+
+    @property
+    def cameras(self) -> Cameras:
+        """The adjusted cameras."""
+        return self.network.cameras
+
+    def position_residuals(self) -> Array:
+        """Return antennas as given minus computed (g, 3), without the common error."""
+        return self.positions.antenna - _antennas(self.cameras, self.positions)
+
+    def interior_covariance(self, camera: int) -> Array:
+        """Return the covariance (q, q) of a camera's free parameters."""
+        first = self.cameras.interior_column[camera]
+        part = slice(first, first + self.cameras.free[camera])
+        return self.cofactor[part, part]
+
+    def intersect(self, sighting: Sighting, cofactor: Array | None = None, change: Array | None = None) -> tuple[Array, Array]:
+        """Return where the marks of a point that took no part meet (3,), and the covariance (3, 3) of that.
+
+        ``cofactor`` and ``change`` (u,) are those of an adjustment that differs a little from this one. NaN where they do not
+        meet.
+        """
+        cameras = self.cameras if change is None else self.cameras.moved(change[: self.cameras.columns])
+        point = meet(cameras, sighting)
+        jacobian, by_point, residual = rows(cameras, sighting, point, len(self.cofactor))
+        if not np.isfinite(residual).all():
+            return np.full(3, np.nan), np.full((3, 3), np.nan)
+        weight = np.repeat(1.0 / sighting.sigma**2, 2)
+        held = np.linalg.inv(by_point.T @ (weight[:, None] * by_point))
+        follow = -held @ by_point.T @ (weight[:, None] * jacobian)
+        return point, held + follow @ (self.cofactor if cofactor is None else cofactor) @ follow.T
+
+    def influence(self, chosen: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Return how tie points (s,) follow the unknowns (s, 3, u), and their covariance with these held (s, 3, 3)."""
+        c, t = self.cameras, self.network.ties
+        follows, held = bundle.influence(
+            t.start, t.view, t.xy, self.weight, self.network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free,
+            c.interior_column, c.columns, chosen,
+        )  # fmt: skip
+        wide = np.zeros((len(chosen), 3, len(self.cofactor)))
+        wide[:, :, : c.columns] = follows
+        return wide, held
+
+
+def adjust(
+    network: Network, control: Sequence[Control], positions: Positions, *, sigma: float, fixed_sigma: bool = False
+) -> Adjusted:
+    """Adjust by Gauss-Newton with Huber's weights on tie points and positions.
+
+    ``sigma`` (px) is that of tie points to start with; the residuals tell it, unless it is ``fixed_sigma``.
+
+    Raises
+    ------
+    NotEnoughData
+        When the observations do not determine the unknowns, or the adjustment does not settle.
+    """
+    places = np.array([c.ground for c in control]).reshape(-1, 3)
+    bias = np.zeros(3)
+    before = np.inf
+    damping = 0.0
+    weight = _tie_weights(network, sigma)
+    for i in range(_ROUNDS):
+        system = _system(network, control, positions, places, bias, weight)
+        change = _solve(system.matrix, system.side, damping)
+        cameras = network.cameras.moved(change[: network.cameras.columns])
+        points = _followed(network, weight, change)
+        places = _follow_control(control, network.cameras, places, change)
+        if len(change) > network.cameras.columns:
+            bias = bias + change[-3:]
+        step = _size(network, change)
+        damping = 0.0 if step < before else max(10 * damping, 1e-3)  # a step that grows overshoots
+        before = step
+        network = replace(network, cameras=cameras, points=points)
+        if i < _WEIGHING:
+            if not fixed_sigma:
+                sigma = _tie_sigma(system.residuals, weight * sigma**2, network)
+            weight = _tie_weights(network, sigma)
+        elif step < _STILL:
+            break
+    else:
+        raise NotEnoughData(
+            "The adjustment does not settle: tie points, ground points and positions contradict each other; look at the "
+            "residuals of METHOD=similarity."
+        )
+    inverse = _inverse(_system(network, control, positions, places, bias, weight).matrix)
+    return Adjusted(network, tuple(control), positions, places, bias, sigma, weight, inverse)
+
+
+@dataclass(frozen=True)
+class _System:
+    matrix: Array
+    side: Array
+    residuals: Array
+
+
+def _system(
+    network: Network, control: Sequence[Control], positions: Positions, places: Array, bias: Array, weight: Array
+) -> _System:
+    c, t = network.cameras, network.ties
+    columns = c.columns
+    matrix, side, residuals = bundle.reduce(
+        t.start, t.view, t.xy, weight, network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free,
+        c.interior_column, columns,
+    )  # fmt: skip
+    matrix = np.triu(matrix) + np.triu(matrix, 1).T
+    for k, (first, interior) in enumerate(zip(c.interior_column, network.interiors, strict=True)):
+        part = slice(first, first + len(interior.names))
+        matrix[part, part] += interior.information
+        side[part] += interior.information @ (interior.known - interior.values(c.brown[k]))
+    with_bias = bool(len(positions)) and bool((positions.shared > 0).any())
+    size = columns + 3 * with_bias
+    if with_bias:
+        matrix, side = np.pad(matrix, (0, 3)), np.append(side, np.zeros(3))
+        common = np.where(positions.shared > 0, positions.shared, _LEAST_SIGMA)
+        matrix[range(columns, size), range(columns, size)] += 1.0 / common**2
+        side[columns:] -= bias / common**2
+    if len(positions):
+        _add_positions(matrix, side, c, positions, bias, with_bias)
+    for one, place in zip(control, places, strict=True):
+        jacobian, by_point, left = rows(c, one.sighting, place, size)
+        effective = left - by_point @ (one.ground - place)
+        spread = np.diag(np.repeat(one.sighting.sigma**2, 2)) + by_point @ one.covariance @ by_point.T
+        weighted = np.linalg.solve(spread, np.column_stack([jacobian, effective]))
+        used = np.flatnonzero(np.any(jacobian != 0, axis=0))
+        matrix[np.ix_(used, used)] += jacobian[:, used].T @ weighted[:, used]
+        side[used] += jacobian[:, used].T @ weighted[:, -1]
+    return _System(matrix, side, residuals)
+
+
+def _add_positions(matrix: Array, side: Array, cameras: Cameras, positions: Positions, bias: Array, with_bias: bool) -> None:
+    left = positions.antenna - _antennas(cameras, positions) - bias
+    weight = position_weights(left, positions.sigma)
+    for view, w, r in zip(positions.view, weight, left, strict=True):
+        own = np.arange(POSE * view + 3, POSE * view + 6)
+        matrix[own, own] += w
+        side[own] += w * r
+        if with_bias:
+            common = np.arange(len(side) - 3, len(side))
+            matrix[common, common] += w
+            matrix[own, common] += w
+            matrix[common, own] += w
+            side[common] += w * r
+
+
+def position_weights(left: Array, sigma: Array) -> Array:
+    """Return Huber's weights over sigma squared (g, 3), for plan and height apart, of the positions' residuals (g, 3)."""
+    plan = np.hypot(*(left[:, :2] / sigma[:, :2]).T)
+    height = np.abs(left[:, 2] / sigma[:, 2])
+    shrink = np.minimum(1.0, _HUBER / np.maximum(np.stack([plan, plan, height], axis=1), 1e-12))
+    return np.asarray(shrink / sigma**2)
+
+
+def _antennas(cameras: Cameras, positions: Positions) -> Array:
+    centres, turns = cameras.centre[positions.view], cameras.rotation[positions.view]
+    return np.asarray(centres + offsets(turns, positions.lever))
+
+
+def rows(cameras: Cameras, sighting: Sighting, point: Array, size: int) -> tuple[Array, Array, Array]:
+    """Return the derivatives of marks by the unknowns (2m, size) and the point (2m, 3), and residuals (2m,) observed - computed.
+
+    Residuals are NaN where the point cannot be seen.
+    """
+    count = len(sighting.view)
+    jacobian, by_point, left = np.zeros((2 * count, size)), np.zeros((2 * count, 3)), np.full(2 * count, np.nan)
+    at, one_point, one_pose, one_brown = np.empty(2), np.empty((2, 3)), np.empty((2, 6)), np.empty((2, 12))
+    first = cameras.interior_column
+    for i, (view, xy) in enumerate(zip(sighting.view, sighting.xy, strict=True)):
+        c = cameras.camera[view]
+        pose = cameras.rotation[view], cameras.centre[view]
+        if not bundle.project(point, *pose, cameras.brown[c], at, one_point, one_pose, one_brown):
+            continue
+        part = slice(2 * i, 2 * i + 2)
+        free = cameras.free[c]
+        left[part], by_point[part] = xy - at, one_point
+        jacobian[part, POSE * view : POSE * view + POSE] = one_pose
+        jacobian[part, first[c] : first[c] + free] = one_brown @ cameras.basis[c, :, :free]
+    return jacobian, by_point, left
+
+
+def meet(cameras: Cameras, sighting: Sighting) -> Array:
+    """Return where the marks of a sighting meet (3,), weighted by their sigmas; NaN where they do not."""
+    start = np.array([0, len(sighting.view)], np.int64)
+    first = _straight(cameras, sighting)
+    if not np.isfinite(first).all():
+        return first
+    points, residuals = bundle.intersect(
+        start, sighting.view, sighting.xy, 1.0 / sighting.sigma**2, first[None], cameras.rotation, cameras.centre, cameras.camera,
+        cameras.brown, cameras.basis, cameras.free, 10,
+    )  # fmt: skip
+    return np.asarray(points[0] if np.isfinite(residuals).all() else np.full(3, np.nan))
+
+
+def _straight(cameras: Cameras, sighting: Sighting) -> Array:
+    """Return the point (3,) nearest to the rays of a sighting, distortion left out; NaN when they are parallel."""
+    brown = cameras.brown[cameras.camera[sighting.view]]
+    x = (sighting.xy - brown[:, 2:4]) / brown[:, :2]
+    inside = np.column_stack([x, np.ones(len(x))])
+    rays = np.einsum("nji,nj->ni", cameras.rotation[sighting.view], inside)
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
+    system = across.sum(axis=0)
+    if np.linalg.cond(system) > 1e12:
+        return np.full(3, np.nan)
+    return np.asarray(np.linalg.solve(system, np.einsum("nij,nj->i", across, cameras.centre[sighting.view])))
+
+
+def _tie_weights(network: Network, sigma: float) -> Array:
+    c, t = network.cameras, network.ties
+    _, residuals = bundle.intersect(
+        t.start, t.view, t.xy, np.ones(len(t.view)), network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free, 0
+    )
+    length = np.hypot(*residuals.T) / sigma
+    weight = np.minimum(1.0, _HUBER / np.maximum(np.where(np.isfinite(length), length, np.inf), 1e-12)) / sigma**2
+    return np.asarray(weight)
+
+
+def _tie_sigma(residuals: Array, shrink: Array, network: Network) -> float:
+    """Return the sigma per axis (px) that weighted residuals tell, with what the unknowns took up given back."""
+    good = np.isfinite(residuals[:, 0])
+    points = len(np.unique(network.ties.point[good]))
+    redundancy = 2 * int(good.sum()) - 3 * points - network.cameras.columns
+    if redundancy <= 0:
+        raise NotEnoughData("The tie points hold too few rays to adjust the block: orient it with more overlap.")
+    return max(float(np.sqrt(np.sum(shrink[good] * np.sum(residuals[good] ** 2, axis=1)) / redundancy)), _LEAST_SIGMA)
+
+
+def _followed(network: Network, weight: Array, change: Array) -> Array:
+    c, t = network.cameras, network.ties
+    return np.asarray(
+        bundle.follow(
+            t.start, t.view, t.xy, weight, network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free,
+            c.interior_column, change,
+        )
+    )  # fmt: skip
+
+
+def _follow_control(control: Sequence[Control], cameras: Cameras, places: Array, change: Array) -> Array:
+    moved = places.copy()
+    for k, one in enumerate(control):
+        jacobian, by_point, left = rows(cameras, one.sighting, places[k], len(change))
+        effective = left - by_point @ (one.ground - places[k])
+        spread = np.diag(np.repeat(one.sighting.sigma**2, 2)) + by_point @ one.covariance @ by_point.T
+        moved[k] = one.ground + one.covariance @ by_point.T @ np.linalg.solve(spread, effective - jacobian @ change)
+    return moved
+
+
+def _size(network: Network, change: Array) -> float:
+    """Return the largest change in metres, or in pixels of a turn."""
+    poses = change[: POSE * len(network.cameras.centre)].reshape(-1, POSE)
+    focal = float(network.cameras.brown[:, 0].max())
+    return float(max(np.abs(poses[:, 3:]).max(), focal * np.abs(poses[:, :3]).max()))
+
+
+def _solve(matrix: Array, side: Array, damping: float) -> Array:
+    scale = _scale(matrix)
+    scaled = matrix * scale * scale[:, None]
+    if damping:
+        scaled[np.diag_indices_from(scaled)] += damping
+    try:
+        return np.asarray(scale * cho_solve(cho_factor(scaled, overwrite_a=True, check_finite=False), scale * side))
+    except LinAlgError as error:
+        raise _undetermined() from error
+
+
+def _inverse(matrix: Array) -> Array:
+    scale = _scale(matrix)
+    try:
+        factor = cho_factor(matrix * scale * scale[:, None], overwrite_a=True, check_finite=False)
+    except LinAlgError as error:
+        raise _undetermined() from error
+    inverse = cho_solve(factor, np.eye(len(matrix)), overwrite_b=True, check_finite=False)
+    inverse = (inverse + inverse.T) / 2
+    return np.asarray(inverse * scale * scale[:, None])
+
+
+def _scale(matrix: Array) -> Array:
+    diagonal = np.diag(matrix)
+    if not np.all(diagonal > 0):
+        raise _undetermined()
+    return np.asarray(1.0 / np.sqrt(diagonal))
+
+
+def _undetermined() -> NotEnoughData:
+    return NotEnoughData(
+        "Tie points, ground points and positions do not determine the block: some photographs hang on too few of them; give more "
+        "control points, or GNSS positions."
+    )
