@@ -19,7 +19,7 @@ def ground_points() -> Iterable[QgsProcessingParameterDefinition]:
     yield ask.field(
         "ROLE_FIELD",
         tr("Field of roles"),
-        tr("The field that says 'control' or 'check'. Check points take no part and tell the accuracy."),
+        tr("The field that says 'control' (or 'GCP', or nothing) or 'check'. Check points take no part and tell the accuracy."),
         of="GCPS",
     )
     yield ask.number("SIGMA_H", tr("Accuracy in plan (m)"), tr("Standard deviation of the ground points in plan."), default=0.01)
@@ -49,14 +49,24 @@ def marks() -> Iterable[QgsProcessingParameterDefinition]:
     yield ask.table(
         "MARKS",
         tr("Marks in the photographs"),
-        tr("A table (a CSV will do) with the fields gcp, image, x, y: where each ground point is seen, in pixels."),
+        tr(
+            "A table (a CSV will do) with the fields gcp, image, x, y: where each ground point is seen, in pixels from the "
+            "top-left corner of the photograph."
+        ),
     )
     yield ask.file(
         "GCP_FILE",
         tr("File of ground points and marks"),
-        tr("Instead of both: a gcp_list.txt of OpenDroneMap, or markers of Metashape as XML."),
+        tr(
+            "Instead of both: OpenDroneMap's gcp_list.txt, Metashape's markers (XML), MicMac's points and image measures, or "
+            "tables (CSV) of points and of marks. Where points and marks are two files give one, and the other is found in its "
+            "folder by what it contains; or give both, separated by a semicolon. A file that names no CRS is taken in the "
+            "survey's."
+        ),
     )
-    yield ask.words("CHECK", tr("Check points"), tr("Names of ground points that shall only check, separated by commas."))
+    yield ask.words(
+        "CHECK", tr("Check points"), tr("Names of ground points that shall only check, separated by commas or semicolons.")
+    )
     yield ask.number("SIGMA_MARK", tr("Accuracy of the marks (px)"), tr("Standard deviation of a mark."), default=0.5)
 
 
@@ -77,7 +87,10 @@ def positions_and_heights() -> Iterable[QgsProcessingParameterDefinition]:
     yield ask.choice(
         "GCP_HEIGHTS",
         tr("Heights of the ground points"),
-        tr("What the ground points' heights refer to: the ellipsoid, or mean sea level (orthometric)."),
+        tr(
+            "What the ground points' heights refer to: the ellipsoid, or mean sea level (orthometric). A compound CRS of the "
+            "points says it, too."
+        ),
         heights,
         default="unknown",
     )
@@ -91,7 +104,10 @@ def positions_and_heights() -> Iterable[QgsProcessingParameterDefinition]:
     yield ask.file(
         "GEOID",
         tr("Geoid"),
-        tr("A raster of geoid heights, or one number in metres. Needed when the two kinds of heights differ."),
+        tr(
+            "How far the geoid lies above the ellipsoid: a raster, or one number in metres (about 50 in western France, about "
+            "-33 in New York). Needed when the two kinds of heights differ."
+        ),
     )
 
 

@@ -33,9 +33,7 @@ def projected_crs(text: str) -> CRS:
         crs = CRS.from_user_input(text)
     except CRSError as error:
         raise InputError(f"The CRS {text!r} is not understood: choose a projected CRS in metres.") from error
-    if crs.is_compound:
-        crs = CRS(crs.sub_crs_list[0])
-    crs = crs.to_2d()
+    crs = horizontal(crs)
     if not crs.is_projected:
         raise InputError(f"The CRS {crs.name} is not projected: choose a projected CRS in metres (UTM or a national grid).")
     if {axis.direction for axis in crs.axis_info} & {"west", "south"}:
@@ -48,8 +46,16 @@ def projected_crs(text: str) -> CRS:
     return crs
 
 
+def horizontal(crs: CRS | str) -> CRS:
+    """Return a CRS without its heights."""
+    crs = CRS.from_user_input(crs)
+    return CRS(crs.sub_crs_list[0]).to_2d() if crs.is_compound else crs.to_2d()
+
+
 def transformer(source: CRS | str, target: CRS | str) -> Transformer:
     """Return the horizontal transformation between two CRS, x before y.
+
+    What a CRS says of heights is left out: a height that PROJ would pass unchanged, for want of a grid, cannot even be asked for.
 
     Raises
     ------
@@ -57,7 +63,7 @@ def transformer(source: CRS | str, target: CRS | str) -> Transformer:
         When PROJ knows only a guess ("ballpark") between the two datums.
     """
     try:
-        return Transformer.from_crs(source, target, always_xy=True, allow_ballpark=False)
+        return Transformer.from_crs(horizontal(source), horizontal(target), always_xy=True, allow_ballpark=False)
     except Exception as error:
         names = " to ".join(CRS.from_user_input(c).name for c in (source, target))
         raise InputError(

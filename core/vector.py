@@ -57,9 +57,11 @@ class Layer:
             if _is_null(value) or (isinstance(value, str) and not value.strip()):
                 continue
             try:
-                values[i] = float(value)
-            except (TypeError, ValueError) as error:
-                raise InputError(f"{self.name}: {value!r} in the field {field} is not a number.") from error
+                values[i] = number_of(value) if isinstance(value, str) else float(value)
+            except (TypeError, ValueError):
+                values[i] = np.nan
+            if np.isnan(values[i]):
+                raise InputError(f"{self.name}: {value!r} in the field {field} is not a number.")
         return values
 
     def _column(self, field: str) -> NDArray[Any]:
@@ -67,6 +69,21 @@ class Layer:
             if name.casefold() == field.casefold():
                 return column
         raise InputError(f"{self.name} has no field {field!r}; it has {', '.join(self.fields) or 'none'}.")
+
+
+def number_of(text: str) -> float:
+    """Return the number that a text holds, with a decimal point or a decimal comma; NaN when it holds none.
+
+    >>> number_of(" 12,5 "), number_of("1e3"), number_of("1,234.5")
+    (12.5, 1000.0, nan)
+    """
+    text = text.strip()
+    if text.count(",") == 1 and "." not in text:
+        text = text.replace(",", ".")
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
 
 
 def read_layer(source: VectorSource) -> Layer:

@@ -740,8 +740,8 @@
    <translation>Champ des rôles</translation>
   </message>
   <message>
-   <source>The field that says 'control' or 'check'. Check points take no part and tell the accuracy.</source>
-   <translation>Le champ qui dit « control » (appui) ou « check » (contrôle). Les points de contrôle ne participent pas et révèlent l'exactitude.</translation>
+   <source>The field that says 'control' (or 'GCP', or nothing) or 'check'. Check points take no part and tell the accuracy.</source>
+   <translation>Le champ qui dit « control » (ou « GCP », ou rien) pour un point d'appui, « check » pour un point de contrôle. Les points de contrôle n'entrent pas dans le calcul et en disent l'exactitude.</translation>
   </message>
   <message>
    <source>Accuracy in plan (m)</source>
@@ -776,20 +776,20 @@
    <translation>Pointés dans les photographies</translation>
   </message>
   <message>
-   <source>A table (a CSV will do) with the fields gcp, image, x, y: where each ground point is seen, in pixels.</source>
-   <translation>Une table (un CSV convient) avec les champs gcp, image, x, y : où chaque point au sol est vu, en pixels.</translation>
+   <source>A table (a CSV will do) with the fields gcp, image, x, y: where each ground point is seen, in pixels from the top-left corner of the photograph.</source>
+   <translation>Une table (un CSV suffit) avec les champs gcp, image, x, y : où chaque point au sol est vu, en pixels depuis le coin supérieur gauche de la photographie.</translation>
   </message>
   <message>
    <source>File of ground points and marks</source>
    <translation>Fichier de points et de pointés</translation>
   </message>
   <message>
-   <source>Instead of both: a gcp_list.txt of OpenDroneMap, or markers of Metashape as XML.</source>
-   <translation>Au lieu des deux : un gcp_list.txt d'OpenDroneMap, ou un fichier de Metashape ou de MicMac.</translation>
+   <source>Instead of both: OpenDroneMap's gcp_list.txt, Metashape's markers (XML), MicMac's points and image measures, or tables (CSV) of points and of marks. Where points and marks are two files give one, and the other is found in its folder by what it contains; or give both, separated by a semicolon. A file that names no CRS is taken in the survey's.</source>
+   <translation>Au lieu des deux : le gcp_list.txt d'OpenDroneMap, les marqueurs de Metashape (XML), les points d'appui et les mesures image de MicMac, ou des tables (CSV) de points et de pointés. Quand points et pointés sont dans deux fichiers, donnez-en un, et l'autre est trouvé dans son dossier par son contenu ; ou donnez les deux, séparés par un point-virgule. Un fichier qui ne nomme pas de SCR est lu dans celui du levé.</translation>
   </message>
   <message>
-   <source>Names of ground points that shall only check, separated by commas.</source>
-   <translation>Noms des points au sol qui ne doivent que contrôler, séparés par des virgules.</translation>
+   <source>Names of ground points that shall only check, separated by commas or semicolons.</source>
+   <translation>Noms des points au sol qui ne servent qu'à vérifier, séparés par des virgules ou des points-virgules.</translation>
   </message>
   <message>
    <source>Accuracy of the marks (px)</source>
@@ -820,8 +820,8 @@
    <translation>Hauteurs des points au sol</translation>
   </message>
   <message>
-   <source>What the ground points' heights refer to: the ellipsoid, or mean sea level (orthometric).</source>
-   <translation>À quoi se rapportent les hauteurs des points au sol : l'ellipsoïde, ou le niveau moyen de la mer (orthometric).</translation>
+   <source>What the ground points' heights refer to: the ellipsoid, or mean sea level (orthometric). A compound CRS of the points says it, too.</source>
+   <translation>À quoi se rapportent les altitudes des points au sol : l'ellipsoïde, ou le niveau moyen de la mer (orthometric). Un SCR composé des points le dit aussi.</translation>
   </message>
   <message>
    <source>Heights of the photographs</source>
@@ -836,8 +836,8 @@
    <translation>Géoïde</translation>
   </message>
   <message>
-   <source>A raster of geoid heights, or one number in metres. Needed when the two kinds of heights differ.</source>
-   <translation>Un raster des hauteurs du géoïde, ou un nombre en mètres. Nécessaire quand les deux sortes de hauteurs diffèrent.</translation>
+   <source>How far the geoid lies above the ellipsoid: a raster, or one number in metres (about 50 in western France, about -33 in New York). Needed when the two kinds of heights differ.</source>
+   <translation>La hauteur du géoïde au-dessus de l'ellipsoïde : un raster, ou un nombre en mètres (environ 50 dans l'ouest de la France, environ -33 à New York). Nécessaire quand les deux sortes d'altitudes diffèrent.</translation>
   </message>
   <message>
    <source>GCPS and GCP_FILE exclude each other: give one of them.</source>

@@ -189,7 +189,7 @@ def _run_cases(
     if control is not None:
         check(control, surveys["JPG"])
         if exposures.raw is not None:
-            controls[True] = moved = raw_request(control, request.marks_raw, exposures, folder)
+            controls[True] = moved = raw_request(control, request.marks_raw, exposures, folder, crs)
             check(moved, surveys["RAW"])
     outcomes = []
     for i, (name, is_raw, enhanced) in enumerate(cases):

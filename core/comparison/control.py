@@ -27,11 +27,15 @@ _FAR = 1000.0  # m in plan between ground points and photographs; a wrong CRS
 
 
 def raw_request(
-    request: georeference.Request, marks_raw: VectorSource | None, exposures: Exposures, folder: Path
+    request: georeference.Request,
+    marks_raw: VectorSource | None,
+    exposures: Exposures,
+    folder: Path,
+    crs: str | None = None,
 ) -> georeference.Request:
     """Return the request for the RAW cases, with the JPG's marks moved to the RAW's frame unless ``marks_raw`` are given.
 
-    Layers that it needs are written into ``folder``.
+    Layers that it needs are written into ``folder``. ``crs`` is the survey's, which ground points have whose format names none.
 
     Raises
     ------
@@ -43,6 +47,9 @@ def raw_request(
     given = read_given(request)
     if given is None:
         return request
+    borrowed = request.crs or crs
+    if borrowed:
+        given = given.in_crs_of(borrowed)
     marks = list(marks_of_table(read_layer(marks_raw))) if marks_raw else _moved(given.marks, exposures)
     points, table = folder / "points.gpkg", folder / "marks.gpkg"
     _write(given, marks, points, table)

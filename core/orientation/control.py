@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -13,14 +14,16 @@ from pyproj.exceptions import CRSError
 
 from ..contract import VectorSource
 from ..errors import InputError
-from ..frames import transformer
+from ..frames import horizontal, transformer
 from ..survey import Photograph
 from ..vector import Layer, read_layer
-from .marks import Mark, key_of, listed, marks_of_table, match_marks
+from .marks import Mark, key_of, listed, marks_of_table, match_marks, match_names
 
 Array = NDArray[np.float64]
 
-_ROLES = {"": "control", "control": "control", "gcp": "control", "check": "check", "checkpoint": "check", "check point": "check"}
+# Without case, accents, blanks and signs.
+_CONTROL = ("", "control", "controlpoint", "gcp", "groundcontrolpoint", "appui", "pointdappui", "passpunkt", "apoyo", "apoio")
+_CHECK = ("check", "checkpoint", "icp", "checkpoints", "verification", "pointdeverification", "validation", "kontrollpunkt")
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,8 @@ class Given:
     """Control as a user gave it.
 
     ``where`` names its source in messages; ``coordinates`` (n, 3) are easting (or longitude), northing (or latitude) and
-    height in ``crs``; ``sigmas`` (n, 2) in plan and height are NaN where nothing was said.
+    height in ``crs``; ``sigmas`` (n, 2) in plan and height are NaN where nothing was said. ``borrows_crs`` tells that the format
+    names no CRS, so that the survey's is meant; ``notes`` what its reader has to say.
     """
 
     where: str
@@ -38,6 +42,15 @@ class Given:
     roles: tuple[str, ...] = ()
     sigmas: Array | None = None
     marks: tuple[Mark, ...] = ()
+    notes: tuple[str, ...] = ()
+    borrows_crs: bool = False
+
+    def in_crs_of(self, crs: str) -> Given:
+        """Return the same in ``crs`` where the format names none."""
+        if self.crs is not None or not self.borrows_crs:
+            return self
+        note = f"{self.where} names no CRS: its coordinates are taken as those of {CRS.from_user_input(crs).name}."
+        return replace(self, crs=crs, notes=(*self.notes, note))
 
 
 @dataclass(frozen=True)
@@ -115,17 +128,25 @@ def control_from(
     if repeated:
         raise InputError(f"Points of {given.where} share a name ({', '.join(repeated)}): give each its own.")
     coordinates = in_metres(given, crs)
-    notes = _zero_heights(given)
+    notes = [*given.notes, *_zero_heights(given)]
     roles = [_role(given.where, role) for role in given.roles] or [False] * len(keys)
-    for name in filter(None, (n.strip() for n in (check or "").split(","))):
-        if key_of(name) not in keys:
-            raise InputError(f"The check point {name!r} of CHECK is not in {given.where}; it has {', '.join(given.names)}.")
-        roles[keys.index(key_of(name))] = True
+    checks = [n.strip() for n in (check or "").replace(";", ",").split(",") if n.strip()]
+    meant = match_names(checks, given.names)
+    unknown = [repr(n) for n in checks if n not in meant]
+    if unknown:
+        raise InputError(
+            f"The check point{'s' * (len(unknown) > 1)} {listed(unknown)} of CHECK {'is' if len(unknown) == 1 else 'are'} not in "
+            f"{given.where}: correct CHECK; the points are {listed(given.names, 20)}."
+        )
+    for name in meant.values():
+        roles[given.names.index(name)] = True
     sigmas = np.full((len(keys), 2), np.nan) if given.sigmas is None else given.sigmas
     sigmas = np.where(np.isnan(sigmas), [sigma_h, sigma_v], sigmas)
     for name, pair in zip(given.names, sigmas, strict=True):
-        if pair.min() <= 0:
-            raise InputError(f"The sigma of {name} in {given.where} is not positive: give a number of metres above 0.")
+        if not (pair.min() > 0 and np.isfinite(pair).all()):
+            raise InputError(
+                f"The sigma of {name} in {given.where} is not above 0: give metres, or leave it empty to use SIGMA_H and SIGMA_V."
+            )
     matched, unmatched = match_marks(given.where, given.marks, given.names, photographs)
     points = [
         GroundPoint(n, c, r, float(s[0]), float(s[1]), matched[n])
@@ -158,19 +179,37 @@ def in_metres(given: Given, crs: str) -> Array:
         raise InputError(f"The coordinates of {given.where} look like degrees, but its CRS is {source.name}: set the right CRS.")
     if source.is_geographic and (np.abs(x).max() > 360 or np.abs(y).max() > 90):
         raise InputError(f"The coordinates of {given.where} are no degrees, but its CRS is {source.name}: set the right CRS.")
+    if source.is_geocentric:
+        raise InputError(f"{given.where} is in {source.name}, which is geocentric: give longitude, latitude and height.")
+    if not (source.is_projected or source.is_geographic):
+        raise InputError(
+            f"{given.where} is in the local system {source.name}, which nothing ties to a map: give a projected CRS."
+        )
     axes = source.axis_info
+    if len(axes) > 2 and axes[2].direction == "down":
+        raise InputError(f"{given.where} has depths ({source.name}): give heights, which count upwards.")
     vertical = axes[2].unit_conversion_factor if len(axes) > 2 else None
     if vertical is None and source.is_projected and abs(axes[0].unit_conversion_factor - 1.0) > 1e-9:
         raise InputError(
             f"{given.where} is in {axes[0].unit_name} ({source.name}) and does not declare the unit of its heights: give it in a "
             "CRS in metres, or in a compound CRS that names the heights' unit."
         )
-    plane = CRS(source.sub_crs_list[0]) if source.is_compound else source.to_2d()
-    easting, northing = transformer(plane, CRS.from_user_input(crs)).transform(x, y)
+    if source.is_projected:
+        _refuse_other_units(given, horizontal(source))
+    easting, northing = transformer(source, crs).transform(x, y)
     moved = np.stack([easting, northing, height * (vertical or 1.0)], axis=1)
     if not np.isfinite(moved).all():
         raise InputError(f"Points of {given.where} lie outside the area of {CRS.from_user_input(crs).name}: set the right CRS.")
     return moved
+
+
+def _refuse_other_units(given: Given, plane: CRS) -> None:
+    """Refuse plan coordinates beyond any grid: those of zones that carry their number in front reach 60,000 km."""
+    furthest = float(np.abs(given.coordinates[:, :2]).max()) * plane.axis_info[0].unit_conversion_factor
+    if furthest > 1e8:
+        raise InputError(
+            f"The coordinates of {given.where} are too large for metres of {plane.name}, as if in millimetres: give metres."
+        )
 
 
 def _coordinates(layer: Layer, names: Sequence[str], height_field: str | None) -> Array:
@@ -179,6 +218,8 @@ def _coordinates(layer: Layer, names: Sequence[str], height_field: str | None) -
     coordinates = np.full((len(layer), 3), np.nan)
     for i, shape in enumerate(layer.geometry):
         parts = [] if shape is None else [p for p in shapely.get_parts(shape) if not p.is_empty]
+        if not parts:
+            raise InputError(f"{names[i]} of {layer.name} has no geometry: place it, or remove it.")
         if len(parts) != 1 or parts[0].geom_type != "Point":
             raise InputError(f"{names[i]} of {layer.name} is not one point: give GCPS as a layer of points.")
         coordinates[i] = parts[0].x, parts[0].y, parts[0].z if parts[0].has_z else np.nan
@@ -198,10 +239,18 @@ def _zero_heights(given: Given) -> list[str]:
 
 
 def _role(where: str, role: str) -> bool:
-    known = _ROLES.get(role.strip().casefold())
-    if known is None:
-        raise InputError(f"The role {role!r} in {where} is not known: use control or check.")
-    return known == "check"
+    word = _bare(role)
+    if word in _CHECK:
+        return True
+    if word in _CONTROL:
+        return False
+    if word in map(_bare, ("contrôle", "point de contrôle", "CP")):  # a French one checks, a Portuguese one controls
+        raise InputError(f"The role {role!r} in {where} can mean control as well as check: write control or check.")
+    raise InputError(f"The role {role!r} in {where} is not known: write control or check.")
+
+
+def _bare(role: str) -> str:
+    return "".join(c for c in unicodedata.normalize("NFKD", role.casefold()) if c.isalnum())
 
 
 def _have(names: Sequence[str]) -> str:

@@ -1,156 +1,135 @@
-"""Files that hold ground control and its marks together: ODM's gcp_list.txt and Metashape's marker XML.
+"""GCP_FILE: ground control and its marks from one file that holds both, or from two of which each holds one.
 
-Each returns marks in this project's image coordinates (corner of the top-left pixel at 0, 0). Files come from strangers: XML is
-parsed without document types, hence without entities.
+ODM's list and Metashape's XML hold both. MicMac's files and tables (CSV) hold one: the user names both, separated by a
+semicolon, or one, and the other is found beside it by what it contains. All readers return marks in this project's image
+coordinates (corner of the top-left pixel at 0, 0).
 """
 
 from __future__ import annotations
 
-import re
+from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
-from pyproj import CRS
-from pyproj.exceptions import CRSError
 
 from ..errors import InputError
+from . import micmac
 from .control import Given
-from .marks import Mark
+from .gcptables import read_table
+from .gcptext import Part, parse_xml, read_text
+from .marks import key_of
+from .metashape import read_markers
+from .odm import read_odm
 
-_UTM = re.compile(r"WGS\s*84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
-_ODM_HALF_PIXEL = 0.5  # ODM counts from the centre of the top-left pixel, we from its corner
-_MOST_BYTES = 200_000_000
+_BESIDE = (".xml", ".txt", ".csv")
+_MOST_BESIDE = 200  # files to look into
+_MOST_BYTES_BESIDE = 5_000_000
+_ESTIMATES = "-s3d"  # points that MicMac intersected itself end so
 
 
 def read_gcp_file(path: str) -> Given:
-    """Read control and marks from a file of ODM or Metashape.
+    """Read control and marks from a file, or from two separated by a semicolon.
 
     Raises
     ------
     InputError
-        When it cannot be read, is of another format, or a line is not complete.
+        When a file cannot be read, is of another format or not complete, or the second file is not found.
     """
-    text = _text(Path(path))
-    name = Path(path).name
-    if text.lstrip().startswith("<"):
-        return _xml(text, name)
-    return _odm(text, name)
-
-
-def _odm(text: str, name: str) -> Given:
-    """Read ODM's list: a line with the CRS, then ``x y z column row image [name] [extras]`` per mark."""
-    lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), start=1)]
-    lines = [(n, line) for n, line in lines if line and not line.startswith("#")]
-    if not lines:
-        raise InputError(f"The GCP file {name} is empty: give ODM's gcp_list.txt or Metashape's marker XML.")
-    crs = _odm_crs(lines[0][1], name)
-    points: dict[str, tuple[float, float, float]] = {}
-    nameless: dict[tuple[float, float, float], str] = {}
-    marks = []
-    for number, line in lines[1:]:
-        words = [w.strip() for w in line.split("\t") if w.strip()] if line.count("\t") >= 5 else line.split()
-        try:
-            x, y, z, column, row = map(float, words[:5])
-            image = words[5]
-        except (ValueError, IndexError) as error:
-            raise InputError(f"The line {number} of {name} is not 'x y z column row image name': correct it.") from error
-        if not np.isfinite([column, row]).all():
-            raise InputError(f"The line {number} of {name} has no finite pixel coordinates: correct it.")
-        place = (x, y, z)
-        gcp = words[6] if len(words) > 6 else nameless.setdefault(place, f"gcp{len(nameless) + 1}")
-        if not np.array_equal(points.setdefault(gcp, place), place, equal_nan=True):
-            raise InputError(f"The line {number} of {name} gives {gcp} other coordinates than before: correct one.")
-        marks.append(Mark(gcp, image, column + _ODM_HALF_PIXEL, row + _ODM_HALF_PIXEL))
-    if not points:
-        raise InputError(f"The GCP file {name} has no points below its first line: add some.")
-    return Given(name, crs, tuple(points), np.array(list(points.values()), float), marks=tuple(marks))
-
-
-def _odm_crs(line: str, name: str) -> str:
-    utm = _UTM.fullmatch(line)
-    if utm:
-        zone = int(utm[1])
-        if 1 <= zone <= 60:
-            return f"EPSG:{(32600 if utm[2].upper() == 'N' else 32700) + zone}"
-    try:
-        crs = CRS.from_user_input(line)
-    except CRSError as error:
+    paths = [Path(path)] if Path(path).is_file() else [Path(p.strip()) for p in path.split(";") if p.strip()]
+    if not 1 <= len(paths) <= 2:
         raise InputError(
-            f"The first line of {name} ({line[:60]!r}) names no CRS: write an EPSG code, a PROJ string or 'WGS84 UTM 11N'; "
-            "of other programs' files only Metashape's marker XML is read, the rest goes in GCPS and MARKS."
-        ) from error
-    # A PROJ string has no name of its own; most mean a CRS that has one.
-    code = crs.to_epsg() if len(crs.axis_info) == 2 else None
-    return f"EPSG:{code}" if code else line
-
-
-def _xml(text: str, name: str) -> Given:
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise InputError(f"{name} declares a document type, which no GCP file needs: remove it.")
-    try:
-        root = ElementTree.fromstring(text)  # noqa: S314 - no document type, hence no entities
-    except ElementTree.ParseError as error:
-        raise InputError(f"{name} is not sound XML ({error}): export it again.") from error
-    if root.find(".//OneAppuisDAF") is not None or root.find(".//MesureAppuiFlottant1Im") is not None:
-        raise InputError(
-            f"{name} is MicMac's, which keeps points and marks in two files without a CRS: give them as GCPS and MARKS instead."
+            f"GCP_FILE names {len(paths)} files: give one, or one of points and one of marks, separated by a semicolon."
         )
-    chunk = root if root.tag == "chunk" else root.find(".//chunk")
-    if root.tag not in ("document", "chunk") or chunk is None:
-        raise InputError(f"{name} is not Metashape's marker XML: export the markers as XML from the Reference pane.")
-    return _metashape(chunk, name)
+    parts = [read_part(p) for p in paths]
+    if len(parts) == 2:
+        return _joined(*parts)
+    part = parts[0]
+    if part.points is not None and part.marks is not None:
+        return replace(part.points, marks=part.marks)
+    other = _beside(paths[0], part)
+    given = _joined(part, other)
+    note = f"{part.where} holds {_content(part)} only: the {_content(other)} are those of {other.where} in the same folder."
+    return replace(given, notes=(*given.notes, note))
 
 
-def _metashape(chunk: ElementTree.Element, name: str) -> Given:
-    """Read a chunk of Metashape's marker XML, whose pixels count from the corner as ours do (the manual's appendix)."""
-    crs = chunk.findtext("reference")
-    cameras = {c.get("id"): c.get("label", "") for c in chunk.iterfind("cameras//camera")}
-    names: dict[str | None, str] = {}
-    places, roles, sigmas = [], [], []
-    for marker in chunk.iterfind("markers//marker"):
-        reference = marker.find("reference")
-        if reference is None or reference.get("x") is None:
-            continue  # a marker without ground coordinates is a tie point
-        label = marker.get("label") or f"marker {marker.get('id')}"
-        names[marker.get("id")] = label
-        places.append([_number(reference, a, name, label) for a in ("x", "y", "z")])
-        sigmas.append([_number(reference, a, name, label) for a in ("sx", "sz")])
-        # Metashape adjusts on the ticked markers and checks on the others.
-        roles.append("control" if reference.get("enabled", "true").lower() in ("true", "1") else "check")
-    if not names:
-        raise InputError(f"{name} has no markers with coordinates: enter them in Metashape's Reference pane and export again.")
-    marks = []
-    for marker in chunk.iterfind("frames/frame/markers/marker"):
-        gcp = names.get(marker.get("marker_id"))
-        for location in marker.iterfind("location"):
-            pinned = location.get("pinned", location.get("valid", "true")).lower() in ("true", "1")
-            image = cameras.get(location.get("camera_id"))
-            if gcp is not None and image and pinned:  # the rest are Metashape's own projections, not measurements
-                marks.append(Mark(gcp, image, _number(location, "x", name, gcp), _number(location, "y", name, gcp)))
-    return Given(name, crs, tuple(names.values()), np.array(places), tuple(roles), np.array(sigmas), tuple(marks))
+def read_part(path: Path) -> Part:
+    """Read what one file holds.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, is of another format, or not complete.
+    """
+    text, name = read_text(path), path.name
+    if text.lstrip().startswith("<"):
+        root = parse_xml(text, name)
+        if micmac.holds_points(root):
+            return micmac.read_points(root, name)
+        if micmac.holds_marks(root):
+            return micmac.read_marks(root, name)
+        return read_markers(root, name)
+    if micmac.is_text(text):
+        return micmac.read_text_points(text, name)
+    return read_table(text, name) or read_odm(text, name)
 
 
-def _number(element: ElementTree.Element, attribute: str, name: str, label: str) -> float:
-    text = element.get(attribute)
-    if text is None:
-        return float("nan")
-    try:
-        return float(text)
-    except ValueError as error:
-        raise InputError(f"{attribute}={text!r} of {label} in {name} is not a number: export the file again.") from error
+def _joined(one: Part, other: Part) -> Given:
+    whole = next((p for p in (one, other) if p.points is not None and p.marks is not None), None)
+    if whole is not None:
+        raise InputError(f"{whole.where} holds points and marks: give it alone as GCP_FILE.")
+    points, marks = (one, other) if one.points is not None else (other, one)
+    if points.points is None or marks.marks is None:
+        raise InputError(f"{one.where} and {other.where} both hold {_content(one)}: give one file of points and one of marks.")
+    return replace(points.points, marks=marks.marks)
 
 
-def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{path} is far too large for a GCP file: give ODM's gcp_list.txt or Metashape's marker XML.")
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"The GCP file {path} cannot be read ({error.strerror}): check its path.") from error
-    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "cp1252"):
+def _beside(path: Path, part: Part) -> Part:
+    """Return the part in the same folder that completes ``part``."""
+    wanted = "marks" if part.points is not None else "points"
+    ours = _names(part)
+    found: list[Part] = []
+    for candidate in _candidates(path):
         try:
-            return data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-    raise InputError(f"The GCP file {path} is not text: give ODM's gcp_list.txt or Metashape's marker XML.")
+            other = read_part(candidate)
+        except InputError:
+            continue  # of something else
+        fits = (other.points is None) == (wanted == "marks") and (other.marks is None) == (wanted == "points")
+        if fits and ours & _names(other) and not any(_same(other, known) for known in found):
+            found.append(other)
+    if not found:
+        raise InputError(
+            f"{part.where} holds {_content(part)} only, and its folder has no file of {wanted} with the same names: name both "
+            "files as GCP_FILE, separated by a semicolon."
+        )
+    if len(found) > 1:
+        raise InputError(
+            f"The {wanted} for {part.where} could be those of {' or '.join(p.where for p in found[:4])}: name both files as "
+            f"GCP_FILE, such as {part.where};{found[0].where}."
+        )
+    return found[0]
+
+
+def _candidates(path: Path) -> list[Path]:
+    try:
+        files = sorted(p for p in path.absolute().parent.iterdir() if p.suffix.lower() in _BESIDE and p.is_file())
+        small = [p for p in files if p.stat().st_size <= _MOST_BYTES_BESIDE and not p.stem.lower().endswith(_ESTIMATES)]
+    except OSError:
+        return []
+    return [p for p in small if p.name != path.name][:_MOST_BESIDE]
+
+
+def _names(part: Part) -> set[str]:
+    names = part.points.names if part.points is not None else [m.gcp for m in part.marks or ()]
+    return {key_of(name) for name in names}
+
+
+def _same(one: Part, other: Part) -> bool:
+    """Tell whether two parts say the same: MicMac's users have their points as text and as the XML made of it."""
+    if one.points is None or other.points is None:
+        return set(one.marks or ()) == set(other.marks or ())
+    a, b = one.points, other.points
+    return a.names == b.names and np.array_equal(np.round(a.coordinates, 4), np.round(b.coordinates, 4), equal_nan=True)
+
+
+def _content(part: Part) -> str:
+    return "points" if part.points is not None else "marks"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from ..block import Block
 from ..errors import InputError
@@ -16,7 +17,8 @@ from ..vector import polygons
 from .control import Control, Given, control_from, given_from_layers
 from .gcpfiles import read_gcp_file
 from .gnss import Gnss, gnss_of
-from .heights import HeightPlan, plan_heights, undulation
+from .heights import HeightPlan, Kind, kind_of_crs, plan_heights, stated_kind, undulation, undulation_of_crs
+from .plausible import check_unit, level_of, refuse_absurd
 
 if TYPE_CHECKING:
     from .georeference import Request
@@ -71,32 +73,89 @@ def gather(request: Request, survey: Survey, given: Given | None, block: Block) 
     """
     crs = _crs(request, survey, given)
     control = Control()
+    stated: Kind = request.gcp_heights
+    kind_notes: tuple[str, ...] = ()
     if given is not None:
+        given = given.in_crs_of(crs)
         control = control_from(
             given, crs, survey.photographs, sigma_h=request.sigma_h, sigma_v=request.sigma_v, check=request.check
         )
+        stated, kind_notes = stated_kind(request.gcp_heights, given.crs, given.where)
+        check_unit(block, control)
     photographs = survey.photographs if request.use_gnss else ()
     gnss = gnss_of(block.views, photographs, crs, request.lever_arm)
-    warnings = [*control.notes, *gnss.notes]
+    warnings = [*control.notes, *kind_notes, *gnss.notes]
+    plan, gnss, told = _levelled(request, given, stated, control, gnss, crs)
+    warnings += told
+    if plan.comparable:
+        plan, told = _compared(plan, (stated, request.gnss_heights), control, gnss, block, survey)
+        warnings += told
+    ignore = shapely.union_all(polygons(request.ignore, crs)) if request.ignore is not None else None
+    return Inputs(crs, control, gnss, plan, _focal_change(survey, block), tuple(warnings), ignore)
+
+
+def _levelled(
+    request: Request, given: Given | None, stated: Kind, control: Control, gnss: Gnss, crs: str
+) -> tuple[HeightPlan, Gnss, list[str]]:
+    """Bring GNSS heights to the GCPs' kind, by GEOID or by the grid of the GCPs' vertical CRS."""
+    geoid, why = request.geoid, ""
+    rise: NDArray[np.float64] | None = None
+    differ = {stated, request.gnss_heights} == {"ellipsoidal", "orthometric"}
+    if not geoid and differ and len(gnss) and given is not None and given.crs and kind_of_crs(given.crs) == "orthometric":
+        try:
+            rise = undulation_of_crs(given.crs, gnss.coordinates, crs)
+        except InputError as error:
+            why = f" ({str(error).split(':', maxsplit=1)[0]})"
     plan = plan_heights(
-        request.gcp_heights,
+        stated,
         request.gnss_heights,
-        geoid=bool(request.geoid),
+        geoid=bool(geoid) or rise is not None,
         with_gcps=bool(control.points),
         with_gnss=len(gnss) > 0,
     )
-    if plan.sign and request.geoid:
-        rise = plan.sign * undulation(request.geoid, gnss.coordinates, crs)
+    told = []
+    if plan.sign:
+        if not geoid:
+            told.append(f"GNSS heights were brought to those of {control.where} by PROJ's grid for its vertical CRS.")
+        rise = plan.sign * (undulation(geoid, gnss.coordinates, crs) if geoid else np.asarray(rise))
         gnss = replace(gnss, coordinates=gnss.coordinates + np.stack([0 * rise, 0 * rise, rise], axis=1))
-    elif request.geoid:
-        warnings.append("GEOID changes nothing here: no GNSS heights have to be brought to another kind.")
+    elif geoid:
+        told.append("GEOID changes nothing here: no GNSS heights have to be brought to another kind.")
     if not plan.comparable:
-        warnings.append(
-            "GNSS and GCP heights are of different kinds and there is no GEOID: GNSS heights are used for differences only, and "
-            "ALTI_GNSS is not determined."
+        told.append(
+            f"GNSS and GCP heights are of different kinds and there is no GEOID{why}: GNSS heights are used for differences "
+            "only, and ALTI_GNSS is not determined."
         )
-    ignore = shapely.union_all(polygons(request.ignore, crs)) if request.ignore is not None else None
-    return Inputs(crs, control, gnss, plan, _focal_change(survey, block), tuple(warnings), ignore)
+    return plan, gnss, told
+
+
+def _compared(
+    plan: HeightPlan, kinds: tuple[Kind, Kind], control: Control, gnss: Gnss, block: Block, survey: Survey
+) -> tuple[HeightPlan, list[str]]:
+    """Look whether GNSS heights lie where the GCPs' do; where not, take them for differences only and say what to set."""
+    level = level_of(block, control, gnss, survey.photographs)
+    if level is None or not level.differs:
+        return plan, []
+    refuse_absurd(level, control.where)
+    apart = f"{abs(level.above):.1f} m {'above' if level.above > 0 else 'below'} those of {control.where}"
+    if plan.sign:
+        cause = "although GEOID has been applied: check its values, GCP_HEIGHTS and GNSS_HEIGHTS"
+    elif "unknown" in kinds:
+        cause = (
+            "as heights above the ellipsoid do against heights above the sea, or a drone's barometer: set GCP_HEIGHTS and "
+            "GNSS_HEIGHTS to what they are, and give GEOID if they differ"
+        )
+    else:
+        cause = f"although both are said to be {kinds[0]}: correct GCP_HEIGHTS or GNSS_HEIGHTS, or expect a drone's barometer"
+    text = f"GNSS heights lie {apart}, {cause}"
+    if level.unit:
+        text += f"; they would agree if the heights of {control.where} were in {level.unit}"
+    if any(not p.check and p.marks for p in control.points):
+        # A wrong level of GNSS must not bend a block that a GCP can level; without one it is all there is.
+        return replace(plan, comparable=False), [
+            f"{text}; until then GNSS heights are used for differences only, and ALTI_GNSS is not determined."
+        ]
+    return plan, [f"{text}."]
 
 
 def _focal_change(survey: Survey, block: Block) -> float:
@@ -111,4 +170,6 @@ def _crs(request: Request, survey: Survey, given: Given | None) -> str:
             return projected_crs(text).to_wkt()
     if given is not None and given.crs:
         return projected_crs(given.crs).to_wkt()
+    if given is not None and given.borrows_crs:
+        raise InputError(f"{given.where} names no CRS, and the survey has none, for its photographs have no positions: give CRS.")
     raise InputError("The survey has no CRS, for its photographs have no positions, and there are no GCPs: give CRS and GCPS.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -81,12 +82,13 @@ def match_marks(
     InputError
         When a mark lies outside its photograph, a point is marked twice in one, or no mark matches.
     """
-    point_of = {key_of(name): name for name in points}
+    names = list(dict.fromkeys(m.gcp for m in marks))
+    point_of = match_names(names, points)
     photo_of = {image: match_photograph(image, photographs) for image in dict.fromkeys(m.image for m in marks)}
     by_name = {p.name: p for p in photographs}
     matched: dict[str, dict[str, Mark]] = {name: {} for name in points}
     for mark in marks:
-        point, image = point_of.get(key_of(mark.gcp)), photo_of[mark.image]
+        point, image = point_of.get(mark.gcp), photo_of[mark.image]
         if point is None or image is None:
             continue
         photo = by_name[image]
@@ -102,17 +104,43 @@ def match_marks(
             )
     if marks and not any(matched.values()):
         raise InputError(
-            f"No mark of {where} matches a point and a photograph of the survey: the marks name {listed(sorted(photo_of))}."
+            f"No mark of {where} matches a point and a photograph of the survey: the marks name the points {listed(names)} in "
+            f"{listed(sorted(photo_of))}, the points are {listed(points)}, the photographs {listed(sorted(by_name), 3)}: "
+            "correct the names."
         )
     notes = []
+    loosely = [f"{name} for {point}" for name, point in point_of.items() if key_of(name) != key_of(point)]
+    if loosely:
+        notes.append(f"Marks were matched by similar names: {listed(loosely)}.")
     strangers = [image for image, name in photo_of.items() if name is None]
     if strangers:
         notes.append(f"Marks in images that are not in the survey were left out: {listed(strangers)}.")
-    unknown = list(dict.fromkeys(m.gcp for m in marks if key_of(m.gcp) not in point_of))
+    unknown = [name for name in names if name not in point_of]
     if unknown:
         notes.append(f"Marks of points that are not among the GCPs were left out: {listed(unknown)}.")
     found = {name: tuple(by_image.values()) for name, by_image in matched.items()}
     return found, notes + _same_place(found)
+
+
+def match_names(wanted: Sequence[str], names: Sequence[str]) -> dict[str, str]:
+    """Return which of ``names`` each of ``wanted`` means; those that mean none are left out.
+
+    Case and blanks are always forgiven; hyphens, underscores, points and leading zeros where one name alone comes near, and
+    nobody means that name more exactly.
+    """
+    exact = {key_of(name): name for name in names}
+    found = {w: exact[key_of(w)] for w in wanted if key_of(w) in exact}
+    free = [name for name in names if name not in found.values()]
+    left = [w for w in wanted if w not in found]
+    near, asked = defaultdict(list), defaultdict(list)
+    for name in free:
+        near[_loose(name)].append(name)
+    for w in left:
+        asked[_loose(w)].append(key_of(w))
+    for w in left:
+        if len(near[_loose(w)]) == 1 and len(set(asked[_loose(w)])) == 1 and _loose(w):
+            found[w] = near[_loose(w)][0]
+    return found
 
 
 def _same_place(matched: Mapping[str, Sequence[Mark]]) -> list[str]:
@@ -129,6 +157,16 @@ def _same_place(matched: Mapping[str, Sequence[Mark]]) -> list[str]:
 def key_of(name: str) -> str:
     """Return a name without the differences that people do not mean: case and blanks."""
     return " ".join(name.casefold().split())
+
+
+def _loose(name: str) -> str:
+    """Return a name without what is often written differently; the digits of separate numbers stay apart."""
+    words = re.findall(r"\d+|[^\W\d_]+", key_of(name))
+    joined = ""
+    for word in words:
+        word = word.lstrip("0") or "0" if word.isdigit() else word
+        joined += f".{word}" if word.isdigit() and joined and joined[-1].isdigit() else word
+    return joined
 
 
 def _path(name: str) -> PurePosixPath:

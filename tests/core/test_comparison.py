@@ -354,6 +354,13 @@ def test_marks_move_with_the_frame(flight, tmp_path, monkeypatch):
     from_file = raw_request(georeference.Request("", gcp_file=str(flight / "gcp_list.txt")), None, Exposures(jpg, raw), tmp_path)
     assert from_file.gcp_file is None
     assert sorted(read_layer(from_file.marks).numbers("x")) == pytest.approx(sorted(after.numbers("x")), abs=2e-3)
+    # Tables name no CRS: the survey's is theirs.
+    (tmp_path / "p.csv").write_text("name,x,y,z\nA,500000,4983000,3\n", encoding="utf-8")
+    (tmp_path / "m.csv").write_text(f"gcp,image,x,y\nA,{jpg.photographs[0].name},1,2\n", encoding="utf-8")
+    tables = georeference.Request("", gcp_file=str(tmp_path / "p.csv"))
+    assert raw_request(tables, None, Exposures(jpg, raw), tmp_path, "EPSG:32631").gcps.crs == "EPSG:32631"
+    elsewhere = replace(tables, crs="EPSG:2154")
+    assert raw_request(elsewhere, None, Exposures(jpg, raw), tmp_path, "EPSG:32631").gcps.crs == "EPSG:2154"
     # Marks in the RAW are taken as they are.
     own = VectorSource(str(flight / "marks.csv"), "marks")
     assert raw_request(base, own, Exposures(jpg, raw), tmp_path).marks == own

@@ -7,7 +7,7 @@ from pyproj import Transformer
 from strandline.core.contract import VectorSource
 from strandline.core.errors import InputError
 from strandline.core.orientation.control import Given, control_from, given_from_layers, in_metres
-from strandline.core.orientation.marks import Mark, match_photograph
+from strandline.core.orientation.marks import Mark, match_names, match_photograph
 from strandline.core.survey import Photograph
 from strandline.core.vector import write_layer
 
@@ -64,7 +64,10 @@ def test_multipoints_of_one_point_are_points(tmp_path):
         ([shapely.Point(1, 2)], "Point", {"n": ["A"]}, "no heights"),
         ([shapely.Point(1, 2, 3)], "Point Z", {"n": [None]}, "has no name"),
         ([shapely.LineString([(1, 2, 3), (2, 3, 4)])], "LineString Z", {"n": ["A"]}, "not one point"),
-        ([None], "Point Z", {"n": ["A"]}, "not one point"),
+        ([None], "Point Z", {"n": ["A"]}, "A of gcps has no geometry"),
+        ([shapely.Point()], "Point Z", {"n": ["A"]}, "A of gcps has no geometry"),
+        ([shapely.MultiPoint([(1, 2, 3), (2, 3, 4)])], "MultiPoint Z", {"n": ["A"]}, "A of gcps is not one point"),
+        ([shapely.box(0, 0, 1, 1)], "Polygon", {"n": ["A"]}, "A of gcps is not one point"),
     ],
 )
 def test_layers_that_are_no_control(tmp_path, shapes, kind, fields, why):
@@ -88,6 +91,23 @@ def test_tables_that_are_no_marks(tmp_path, text, why):
     table.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=why):
         given_from_layers(points, VectorSource(str(table), "marks"), name_field="n", height_field=None)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "gcp;image;x;y\nA;DJI_0001;10,25;20\n",
+        'gcp,image,x,y\nA,DJI_0001,"10,25","20"\n',
+        "gcp\timage\tx\ty\nA\tDJI_0001\t10.25\t2e1\n",
+        '\ufeffgcp;image;x;y\r\n"A";"DJI_0001";"10,25";" 20 "\r\n',
+    ],
+)
+def test_tables_of_marks_as_spreadsheets_write_them(tmp_path, text):
+    points = layer(tmp_path / "g.gpkg", {"n": ["A"]}, [shapely.Point(*PLACES[0])])
+    table = tmp_path / "marks.csv"
+    table.write_text(text, encoding="utf-8")
+    read = given_from_layers(points, VectorSource(str(table), "marks"), name_field="n", height_field=None)
+    assert read.marks == (Mark("A", "DJI_0001", 10.25, 20.0),)
 
 
 @pytest.mark.parametrize(
@@ -135,6 +155,25 @@ def test_what_does_not_match_is_listed():
         ({"coordinates": PLACES * [1, 1, np.nan]}, "no complete coordinates"),
         ({"coordinates": np.array([[3.0, 45.0, 1.0], [3.001, 45.0, 1.0], [3.0, 45.001, 1.0]])}, "look like degrees"),
         ({"crs": "EPSG:4326"}, "are no degrees"),
+        (
+            {"crs": 'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1]]'},
+            "gcps is in the local system",
+        ),
+        ({"crs": "EPSG:4978"}, "which is geocentric: give longitude, latitude and height"),
+        ({"crs": "EPSG:32631+5706"}, "has depths"),
+        (
+            {"coordinates": PLACES * 1000.0},
+            "are too large for metres of WGS 84 / UTM zone 31N, as if in millimetres: give metres",
+        ),
+        (
+            {"sigmas": np.array([[0.01, 0.02], [0.1, -0.1], [0.1, 0.1]])},
+            "sigma of B in gcps is not above 0: give metres, or leave",
+        ),
+        ({"sigmas": np.array([[0.01, 0.02], [0.1, np.inf], [0.1, 0.1]])}, "sigma of B"),
+        ({"roles": ("Contrôle", "", "")}, "'Contrôle' in gcps can mean control as well as check: write control or check"),
+        ({"roles": ("CP", "", "")}, "'CP' in gcps can mean control as well as check"),
+        ({"roles": ("v", "", "")}, "'v' in gcps is not known: write control or check"),
+        ({"check": "B, Y, Z"}, "The check points 'Y', 'Z' of CHECK are not in gcps: correct CHECK; the points are A, B, C"),
         ({"crs": "EPSG:2263"}, "does not declare the unit of its heights"),
     ],
 )
@@ -149,6 +188,49 @@ def test_check_points_by_name_and_identical_marks():
     found = control(check="b, C", roles=("check", "", "control"), marks=twice)
     assert [p.check for p in found.points] == [True, True, True]
     assert len(found.points[0].marks) == 1
+
+
+def test_roles_in_several_spellings_and_languages():
+    checks = ("Check", "CHECK-POINT", "check_point", "ICP", "Point de vérification", "Kontrollpunkt")
+    controls = ("", "Control", "GCP", " control point ", "Point d'appui", "Paßpunkt")
+    names = tuple(map(str, range(12)))
+    found = control(names=names, coordinates=np.tile(PLACES, (4, 1)), roles=checks + controls)
+    assert [p.check for p in found.points] == [True] * 6 + [False] * 6
+
+
+@pytest.mark.parametrize(
+    ("wanted", "names", "found"),
+    [
+        (["a 1", "B"], ["A 1", "b"], {"a 1": "A 1", "B": "b"}),
+        (["P1"], ["P01", "P02"], {"P1": "P01"}),
+        (["gcp_7", "GCP-08"], ["GCP 7", "gcp8"], {"gcp_7": "GCP 7", "GCP-08": "gcp8"}),
+        (["P1"], ["P01", "P001"], {}),  # two come near
+        (["P01", "P1"], ["P01"], {"P01": "P01"}),  # P1 is another, for P01 is named
+        (["P1", "P-1"], ["P01"], {}),  # two are meant
+        (["P1-12"], ["P11-2"], {}),  # the digits of two numbers stay apart
+        (["1.05"], ["1.5"], {"1.05": "1.5"}),
+        (["10"], ["1", "01"], {}),
+        (["-"], ["_"], {}),
+    ],
+)
+def test_names_match_forgivingly_where_only_one_can_be_meant(wanted, names, found):
+    assert match_names(wanted, names) == found
+
+
+def test_what_matches_by_a_similar_name_is_told():
+    found = control(
+        names=("P01", "P02", "P03"), marks=(Mark("p-1", "DJI_0001", 1, 2), Mark("P02", "DJI_0001", 5, 6)), check="p 2;P3"
+    )
+    assert [len(p.marks) for p in found.points] == [1, 1, 0]
+    assert [p.check for p in found.points] == [False, True, True]
+    assert found.notes == ("Marks were matched by similar names: p-1 for P01.",)
+
+
+def test_nothing_that_matches_lists_both_sides():
+    with pytest.raises(
+        InputError, match=r"the marks name the points X, Y in a\.jpg, the points are A, B, C, the photographs DJI_0001"
+    ):
+        control(marks=(Mark("X", "a.jpg", 1, 2), Mark("Y", "a.jpg", 1, 2)))
 
 
 def test_zero_heights_are_called_out():

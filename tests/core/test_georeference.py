@@ -437,11 +437,12 @@ def test_gnss_with_declared_sigmas_is_taken_at_its_word(tmp_path):
 
 def test_gnss_apart_from_control(tmp_path):
     scene = Scene(tmp_path, gnss_shift=(0.4, 0.3, 48.0), mark_noise=0.0)
-    result = run(scene.request(gnss=True))
+    result = run(scene.request(gnss=True, method="similarity"))
     assert np.abs(scene.errors()).max() < 1e-4  # GNSS did not enter
     assert result.plani_gnss == pytest.approx(0.5, abs=1e-3)
-    assert result.alti_gnss == pytest.approx(48.0, abs=1e-3)
-    assert "+48.0 m off" in scene.report()
+    assert result.alti_gnss is None  # heights of two kinds are not compared
+    assert "GNSS heights lie 48.0 m above those of gcps, as heights above the ellipsoid do" in scene.report()
+    assert "set GCP_HEIGHTS and GNSS_HEIGHTS to what they are" in scene.report()
 
 
 def test_a_geoid_brings_gnss_to_the_control(tmp_path):
@@ -706,3 +707,96 @@ def test_another_datum_is_suspected(tmp_path):
     scene = Scene(tmp_path, gnss_shift=(90.0, 60.0, 0.0))
     run(scene.request(gnss=True))
     assert "GNSS positions are 108 m off the block" in scene.report()
+
+
+# Ground control of other makes, and heights that cannot be right
+
+
+def test_micmacs_files_give_the_same_block(tmp_path):
+    scene = Scene(tmp_path, mark_noise=0.0)
+    files = tmp_path / "micmac"
+    files.mkdir()
+    points = "".join(
+        f"<OneAppuisDAF><Pt>{' '.join(map(repr, map(float, p)))}</Pt><NamePt>{n}</NamePt><Incertitude>1 1 "
+        "1</Incertitude></OneAppuisDAF>"
+        for n, p in scene.gcps.items()
+    )
+    marks = "".join(
+        f"<MesureAppuiFlottant1Im><NameIm>{i}</NameIm><OneMesureAF1I><NamePt>{g}</NamePt><PtIm>{float(x)!r} {float(y)!r}</PtIm>"
+        "</OneMesureAF1I></MesureAppuiFlottant1Im>"
+        for g, i, x, y in scene.marks
+    )
+    (files / "gcps.xml").write_text(f"<DicoAppuisFlottant>{points}</DicoAppuisFlottant>", encoding="utf-8")
+    measures = f"<SetOfMesureAppuisFlottants>{marks}</SetOfMesureAppuisFlottants>"
+    (files / "measures-S2D.xml").write_text(measures, encoding="utf-8")
+    result = run(scene.request([], gcp_file=str(files / "gcps.xml")))
+    assert result.control_count == 6
+    assert np.abs(scene.errors()).max() < 1e-4
+    assert "the marks are those of measures-S2D.xml in the same folder" in scene.report()
+    assert "gcps.xml names no CRS: its coordinates are taken as those of WGS 84 / UTM zone 31N" in scene.report()
+    survey = Survey.create(tmp_path / "survey", tmp_path, None, [replace(p, position=None) for p in scene.survey.photographs])
+    survey.finish("orient", "1", built_on=(), parameters={}, result={})
+    with pytest.raises(InputError, match=r"gcps\.xml names no CRS, and the survey has none, .* give CRS\."):
+        run(scene.request([], gcp_file=str(files / "gcps.xml")))
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("millimetres", 1000.0), ("feet", 1 / 0.3048)])
+def test_heights_in_another_unit_are_refused_by_name(tmp_path, unit, factor):
+    scene = Scene(tmp_path)
+    scene.gcps = {n: p * [1, 1, factor] for n, p in scene.gcps.items()}
+    with pytest.raises(InputError, match=f"The heights of gcps fit the photographs as {unit}"):
+        run(scene.request(gnss=True))
+
+
+def test_one_point_on_another_level_than_gnss_does_not_bend_the_block(tmp_path):
+    """Nothing was said of the heights: the mismatch is found, told, and GNSS used for differences only."""
+    scene = Scene(tmp_path, gnss_noise=0.03, gnss_sigma=0.03, gnss_shift=(0.0, 0.0, 45.0))
+    result = run(scene.request(["middle"], gnss=True))
+    at = np.hypot(*(scene.points[:, :2] - np.array(GCPS["middle"])[:2]).T) < 10
+    assert np.abs(scene.errors()[at]).max() < 0.1
+    assert result.alti_gnss is None
+    assert "GNSS heights lie 45" in scene.report()
+
+
+def test_check_points_alone_tell_the_mismatch_as_their_error(tmp_path):
+    scene = Scene(tmp_path, gnss_noise=0.03, gnss_sigma=0.03, gnss_shift=(0.0, 0.0, 45.0))
+    result = run(scene.request(["middle", "west"], gnss=True, check="middle, west"))
+    assert result.alti_check == pytest.approx(45.0, abs=0.5)
+    assert "GNSS heights lie 45" in scene.report()
+
+
+def test_a_geoid_with_the_wrong_sign_is_told(tmp_path):
+    scene = Scene(tmp_path, gnss_shift=(0, 0, 48.0), mark_noise=0.0)
+    kinds = {"gcp_heights": "orthometric", "gnss_heights": "ellipsoidal"}
+    assert run(scene.request(gnss=True, geoid="-48", **kinds)).alti_gnss is None
+    assert "GNSS heights lie 96.0 m above those of gcps, although GEOID has been applied: check its values" in scene.report()
+
+
+def test_a_vertical_crs_without_its_grid_leaves_gnss_heights_out_and_says_why(tmp_path):
+    scene = Scene(tmp_path, gnss_shift=(0, 0, 48.0), mark_noise=0.0)
+    request = scene.request(gnss=True, gnss_heights="ellipsoidal", method="similarity")
+    request = replace(request, gcps=replace(request.gcps, crs="EPSG:32631+5773"))  # EGM96 heights
+    assert run(request).alti_gnss is None
+    assert np.abs(scene.errors()).max() < 1e-4
+    assert Georef.read(Survey.open(tmp_path / "survey")).heights == "orthometric"
+    assert "The heights of gcps are taken as orthometric, as its CRS WGS 84 / UTM zone 31N + EGM96 height says" in scene.report()
+    assert (
+        "there is no GEOID (PROJ has no grid installed for EGM96 height at the survey): GNSS heights are used for"
+        in scene.report()
+    )
+    assert run(replace(request, geoid="48")).alti_gnss == pytest.approx(0.0, abs=1e-3)
+    assert "PROJ's grid" not in scene.report()
+    with pytest.raises(InputError, match="GCP_HEIGHTS is ellipsoidal but the CRS of gcps"):
+        run(replace(request, gcp_heights="ellipsoidal"))
+
+
+def test_the_grid_of_a_vertical_crs_brings_gnss_to_the_control(tmp_path, monkeypatch):
+    """What PROJ makes of a real grid is tested with the heights; here one of 48 m stands in for it."""
+    scene = Scene(tmp_path, gnss_shift=(0, 0, 48.0), mark_noise=0.0)
+    monkeypatch.setattr(
+        "strandline.core.orientation.inputs.undulation_of_crs", lambda _crs, points, _of: np.full(len(points), 48.0)
+    )
+    request = scene.request(gnss=True, gnss_heights="ellipsoidal", method="similarity")
+    request = replace(request, gcps=replace(request.gcps, crs="EPSG:32631+5773"))
+    assert run(request).alti_gnss == pytest.approx(0.0, abs=1e-3)
+    assert "GNSS heights were brought to those of gcps by PROJ" in scene.report()

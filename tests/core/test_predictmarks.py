@@ -172,7 +172,7 @@ def orient(folder, simulation):
             model.points3D[model.add_point3D(place, track)].error = 0.3
         (folder / target).mkdir()
         model.write(folder / target)
-    Georef(local, "similarity", (), (0.0, 0.0, 0.0), tuple(LEVEL.ravel().tolist())).write(survey)
+    replace(georef(LEVEL), frame=local).write(survey)
     survey.finish("orient", "1", built_on=("createsurvey",), parameters={}, result={})
     survey.finish("georeference", "2", built_on=("orient",), parameters={}, result={})
 

@@ -125,6 +125,11 @@ def test_values_arrive_by_type(sent, survey, tmp_path):
     assert [request[k] for k in ("gcps", "marks", "name_field", "ignore", "residuals", "photos")] == [None] * 6
 
 
+def test_a_pair_of_ground_control_files_arrives_as_it_was_given(sent, survey, tmp_path):
+    pair = f"{tmp_path / 'points.xml'};{tmp_path / 'measures-S2D.xml'}"
+    assert sent("georeference", {"SURVEY": survey, "GCP_FILE": pair})["gcp_file"] == pair
+
+
 def test_points_keep_z_ids_types_and_nulls(sent, survey, tmp_path):
     gcps = memory(
         "PointZ?crs=EPSG:32631",
