@@ -39,17 +39,18 @@ class Georeference(StepAlgorithm):
             "METHOD",
             tr("Method"),
             tr(
-                "similarity: shift, rotation and scale alone, the shape of the block stays; adjustment: a bundle adjustment in "
-                "which the control points also mend the shape."
+                "adjustment: tie points, control points and GNSS positions are adjusted together, the camera included, so that "
+                "the control also mends the shape and every sigma is that of the whole; similarity: shift, rotation and scale "
+                "alone, the shape that the photographs gave stays."
             ),
             ("adjustment", "similarity"),
-            default="similarity",
+            default="adjustment",
         )
         yield from groundcontrol.positions_and_heights()
         yield ask.polygons(
             "IGNORE",
             tr("Areas to ignore"),
-            tr("Polygons of water, people or vehicles; tie points in them take no part."),
+            tr("Polygons of sea, swash, vegetation, people or vehicles: tie points on what moves take no part."),
         )
         yield ask.crs("CRS", tr("CRS of the survey"), tr("Projected CRS of the results; empty: the survey's own."))
         yield ask.point_output(

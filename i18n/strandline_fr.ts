@@ -636,12 +636,12 @@
    <translation>Rattache un levé orienté au terrain par des points d'appui, par les positions des photographies, ou par les deux, et dit avec quelle qualité : sur les points d'appui, sur des points de contrôle qui n'ont pas servi, et en écartant chaque point d'appui à son tour.</translation>
   </message>
   <message>
-   <source>similarity: shift, rotation and scale alone, the shape of the block stays; adjustment: a bundle adjustment in which the control points also mend the shape.</source>
-   <translation>similarity : translation, rotation et échelle seules, la forme du bloc demeure ; adjustment : une compensation par faisceaux dans laquelle les points d'appui corrigent aussi la forme.</translation>
+   <source>adjustment: tie points, control points and GNSS positions are adjusted together, the camera included, so that the control also mends the shape and every sigma is that of the whole; similarity: shift, rotation and scale alone, the shape that the photographs gave stays.</source>
+   <translation>adjustment : points de liaison, points d'appui et positions GNSS sont compensés ensemble, caméra comprise, si bien que l'appui corrige aussi la forme et que chaque écart-type est celui de l'ensemble ; similarity : translation, rotation et échelle seules, la forme issue des photographies reste.</translation>
   </message>
   <message>
-   <source>Polygons of water, people or vehicles; tie points in them take no part.</source>
-   <translation>Polygones d'eau, de personnes ou de véhicules ; les points de liaison qui s'y trouvent ne participent pas.</translation>
+   <source>Polygons of sea, swash, vegetation, people or vehicles: tie points on what moves take no part.</source>
+   <translation>Polygones de mer, de jet de rive, de végétation, de personnes ou de véhicules : les points de liaison sur ce qui bouge n'interviennent pas.</translation>
   </message>
   <message>
    <source>Projected CRS of the results; empty: the survey's own.</source>

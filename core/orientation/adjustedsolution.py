@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from ..block import Block
 from ..frames import LocalFrame
 from .adjustment import Adjusted, Control, Positions, Sighting
 from .alternatives import alternatives
@@ -17,6 +18,7 @@ from .bundle import POSE
 from .common import of_adjustment
 from .gnss import SHARED, Gnss, offsets
 from .interior import Interior, told
+from .marks import listed
 from .observations import Seen
 from .reliability import Test, without
 from .solution import AdjustedCamera, Solution, WrongMark
@@ -27,6 +29,7 @@ Array = NDArray[np.float64]
 _TIE_SAMPLE = 2000  # tie points whose own sigma is computed
 _HOLDS_HEIGHT = 0.01  # m, and twice what positions alone would give: what must be told of heights without control
 _ALIKE = 3.0  # tie points that count as one: what is told of
+_LOOSE, _LOOSE_MATTERS = 5.0, 0.5  # times the others' sigma, and metres
 _ENLARGED = 9.0  # variance factor of ground points that is told of
 
 
@@ -73,7 +76,7 @@ def solve_adjustment(
     checks = [i for i, s in enumerate(seen) if s.point.check and s.found is not None]
     blunders += _wrong_checks(checks, seen, errors, total)
     cameras = _cameras(adjusted, sorted(interiors), interiors, labels)
-    notes = _weight_notes(settled, gnss, bool(control))
+    notes = [*_weight_notes(settled, gnss, bool(control)), *_loose_notes(adjusted, block)]
     for camera, interior, c in zip(cameras, adjusted.network.interiors, range(len(cameras)), strict=True):
         if len(interior.names):
             notes += told(camera.label, interior, adjusted.interior_covariance(c), camera.values)
@@ -270,6 +273,20 @@ def _weight_notes(settled: Weighted, gnss: Gnss, with_control: bool) -> list[str
                 "may stand on different reference stations, datums or kinds of height."
             )
     return notes
+
+
+def _loose_notes(adjusted: Adjusted, block: Block) -> list[str]:
+    """Say which photographs are known far worse than the others."""
+    sigma = np.linalg.norm(_centre_sigma(adjusted), axis=1)
+    loose = sigma > max(_LOOSE * float(np.median(sigma)), _LOOSE_MATTERS)
+    if not loose.any() or loose.mean() > 0.5:
+        return []
+    names = [view.name for view, one in zip(block.views, loose, strict=True) if one]
+    return [
+        f"{listed(names)} {'is' if len(names) == 1 else 'are'} known to {sigma[loose].max():.1f} m only against the rest of the "
+        f"block, which is known to {np.median(sigma):.2f} m: too few tie points join them to more than one photograph of it; do not use "
+        "their ground, or give control points on it."
+    ]
 
 
 def _gnss_errors(adjusted: Adjusted, gnss: Gnss, frame: LocalFrame) -> Array:

@@ -28,6 +28,9 @@ _ROUNDS = 40
 _WEIGHING = 6  # rounds after which the tie points' weights and sigma stand, so that the rest can settle
 _STILL = 1e-6  # m, and px at the image's edge: a change below which the adjustment stands
 _HUBER = 2.5  # sigmas of a tie point's 2D residual, or of a position's, beyond which it weighs less (Huber 1964)
+_SINGULAR = 2e-14  # of the largest eigenvalue: below, it is rounding
+_LOOSE = 10.0  # m
+_WITH = 0.2  # of the largest motion: what moves with it
 _HALVINGS = 8  # of a step that overshoots
 _GAIN = 1e-6  # of the sum of squares in sigmas: below, no unknown moves by more than a thousandth of its own
 _NOISE = 1e-10  # of the cost: what rounding may add
@@ -172,7 +175,7 @@ def adjust(
     cost, weighed = _cost(state, control, positions, weights), 0
     for _ in range(_ROUNDS):
         system = _system(state, control, positions, weights)
-        change = _solve(system.matrix, system.side)
+        change = _solve(system.matrix, system.side, len(network.cameras.centre))
         for _ in range(_HALVINGS):
             tried = _moved(state, control, weights, change)
             trial = _cost(tried, control, positions, weights)
@@ -194,7 +197,7 @@ def adjust(
             "The adjustment does not settle: tie points, ground points and positions contradict each other; look at the "
             "residuals of METHOD=similarity."
         )
-    inverse = _inverse(_system(state, control, positions, weights).matrix)
+    inverse = _inverse(_system(state, control, positions, weights).matrix, len(network.cameras.centre))
     return Adjusted(state.network, tuple(control), positions, state.places, state.bias, sigma, effect, weights.tie, inverse)
 
 
@@ -352,13 +355,13 @@ def meet(cameras: Cameras, sighting: Sighting) -> Array:
 
 
 def _straight(cameras: Cameras, sighting: Sighting) -> Array:
-    """Return the point (3,) nearest to the rays of a sighting, distortion left out; NaN when they are parallel."""
+    """Return the point (3,) nearest to the rays of a sighting, weighted, distortion left out; NaN when they are parallel."""
     brown = cameras.brown[cameras.camera[sighting.view]]
     x = (sighting.xy - brown[:, 2:4]) / brown[:, :2]
     inside = np.column_stack([x, np.ones(len(x))])
     rays = np.einsum("nji,nj->ni", cameras.rotation[sighting.view], inside)
     rays /= np.linalg.norm(rays, axis=1)[:, None]
-    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
+    across = (np.eye(3) - rays[:, :, None] * rays[:, None, :]) / sighting.sigma[:, None, None] ** 2
     system = across.sum(axis=0)
     if np.linalg.cond(system) > 1e12:
         return np.full(3, np.nan)
@@ -433,24 +436,46 @@ def _size(network: Network, change: Array) -> float:
     return float(max(np.abs(poses[:, 3:]).max(), focal * np.abs(poses[:, :3]).max()))
 
 
-def _solve(matrix: Array, side: Array) -> Array:
+def _solve(matrix: Array, side: Array, views: int) -> Array:
     scale = _scale(matrix)
-    scaled = matrix * scale * scale[:, None]
-    try:
-        return np.asarray(scale * cho_solve(cho_factor(scaled, overwrite_a=True, check_finite=False), scale * side))
-    except LinAlgError as error:
-        raise _undetermined() from error
+    factor = _factor(matrix * scale * scale[:, None], scale, views)
+    return np.asarray(scale * cho_solve(factor, scale * side))
 
 
-def _inverse(matrix: Array) -> Array:
+def _inverse(matrix: Array, views: int) -> Array:
     scale = _scale(matrix)
-    try:
-        factor = cho_factor(matrix * scale * scale[:, None], overwrite_a=True, check_finite=False)
-    except LinAlgError as error:
-        raise _undetermined() from error
+    factor = _factor(matrix * scale * scale[:, None], scale, views)
     inverse = cho_solve(factor, np.eye(len(matrix)), overwrite_b=True, check_finite=False)
     inverse = (inverse + inverse.T) / 2
     return np.asarray(inverse * scale * scale[:, None])
+
+
+def _factor(scaled: Array, scale: Array, views: int) -> tuple[Array, bool]:
+    """Return Cholesky's factor; where a part of the block hangs loose, it is held where it is to ``_LOOSE`` metres.
+
+    Photographs that only one other ties to the rest, along a straight strip, slide on rays: nothing tells their scale. That
+    much is said by their sigma. What moves most of the block at once is no such part, and refused.
+
+    Raises
+    ------
+    NotEnoughData
+        When the block as a whole is not determined.
+    """
+    try:
+        return cho_factor(scaled, check_finite=False)
+    except LinAlgError:
+        pass
+    values, vectors = np.linalg.eigh(scaled)
+    held = scaled
+    for vector in vectors[:, values < _SINGULAR * values[-1]].T:
+        moves = np.abs((vector * scale)[: POSE * views].reshape(views, POSE)[:, 3:]).max(axis=1)
+        if np.mean(moves > _WITH * moves.max()) > 0.5:
+            raise _undetermined()
+        held = held + np.outer(vector, vector) * (moves.max() / _LOOSE) ** 2
+    try:
+        return cho_factor(held, check_finite=False)
+    except LinAlgError as error:
+        raise _undetermined() from error
 
 
 def _scale(matrix: Array) -> Array:

@@ -22,11 +22,12 @@ from ..progress import SILENT, Progress
 from ..survey import Survey, held
 from ..vector import check_destination
 from . import georeport, interior
-from .accuracy import Doming, alti, doming, plani
+from .accuracy import Doming, alti, plani
 from .adjustedsolution import solve_adjustment
 from .assembly import assemble, write_back
 from .calibration import read_calibration
-from .findings import findings, ground_pixel, verdict
+from .domes import dome_of
+from .findings import findings, verdict
 from .ignoring import outside
 from .inputs import Inputs, gather, read_given
 from .observations import Seen, find_marks
@@ -303,7 +304,7 @@ def _result(request: Request, solution: Solution, inputs: Inputs) -> tuple[Resul
     control, checks = solution.errors[found & ~check], solution.errors[found & check]
     loo = solution.loo[np.isfinite(solution.loo[:, 0])]
     gnss_alti = alti(solution.gnss_errors) if inputs.heights.comparable else None
-    dome = _doming(solution, inputs)
+    dome = dome_of(solution, inputs.gnss)
     result = Result(
         request.survey,
         len(control),
@@ -319,28 +320,6 @@ def _result(request: Request, solution: Solution, inputs: Inputs) -> tuple[Resul
         dome.amplitude if dome else None,
     )
     return result, dome
-
-
-def _doming(solution: Solution, inputs: Inputs) -> Doming | None:
-    """Test for a dome on the errors of control and check points, or with too few of them on GNSS heights.
-
-    An adjustment bends towards its control points: there their errors when left out take the place of their residuals. The worst
-    blunder in height is left out: one in the middle looks like a dome. Others stay, for a dome makes blunders of many.
-    """
-    limit = ground_pixel(solution.block)
-    worst = max((b for b in solution.blunders if b.part == "height"), key=lambda b: b.ratio, default=None)
-    used = np.array([s.found is not None and (worst is None or s.point.name != worst.name) for s in solution.seen], bool)
-    places = np.array([s.point.coordinates for s in solution.seen], float).reshape(-1, 3)[:, :2]
-    heights, sigmas = solution.errors[:, 2], solution.sigmas[:, 2]
-    if solution.method == "adjustment":
-        left_out = np.isfinite(solution.loo[:, 2])
-        heights = np.where(left_out, solution.loo[:, 2], heights)
-        sigmas = np.where(left_out, solution.loo_sigma[:, 2], sigmas)
-    dome = doming(places[used], heights[used], sigmas[used], limit)
-    if dome is None and len(inputs.gnss):
-        declared = inputs.gnss.sigmas[:, 1] if inputs.gnss.declared else None
-        dome = doming(inputs.gnss.coordinates[:, :2], solution.gnss_errors[:, 2], declared, limit)
-    return dome
 
 
 def _georef(solution: Solution, inputs: Inputs, result: Result) -> Georef:

@@ -127,6 +127,7 @@ def _residual_fields(solution: Solution) -> dict[str, Any]:
         "plani": np.hypot(solution.errors[:, 0], solution.errors[:, 1]),
         "sigma_h": [s.point.sigma_h for s in seen],
         "sigma_v": [s.point.sigma_v for s in seen],
+        **_sigmas(solution),
         "loo_dE": solution.loo[:, 0],
         "loo_dN": solution.loo[:, 1],
         "loo_dU": solution.loo[:, 2],
@@ -135,6 +136,12 @@ def _residual_fields(solution: Solution) -> dict[str, Any]:
         "loo_sigma_v": solution.loo_sigma[:, 2],
         "blunder": [s.point.name in blunders for s in seen],
     }
+
+
+def _sigmas(solution: Solution) -> dict[str, Array]:
+    """Return the predicted sigmas of check points' errors; a similarity tells none."""
+    sigmas = np.full((len(solution.seen), 3), np.nan) if solution.predicted is None else solution.predicted
+    return {f"sigma_{name}": values for name, values in _components(sigmas).items()}
 
 
 def _components(errors: Array) -> dict[str, Array]:

@@ -23,7 +23,8 @@ _CENTRED = 0.01  # of the longer side: how far off the middle makers let the pri
 _UNKNOWN_FOCAL = 0.1  # relative, when the files do not tell
 # Of small cameras with fixed lenses, wide of what is seen: radial terms of a tenth, decentring terms of a thousandth.
 _DISTORTION = {"k1": 0.3, "k2": 0.3, "p1": 0.005, "p2": 0.005, "k3": 0.3, "k4": 0.3, "k5": 0.3, "k6": 0.3}
-# What a lens keeps from flight to flight, where its calibration carries no covariance: the focal length in CALIBRATION_SIGMA.
+# What a lens keeps from flight to flight. A calibration without a covariance is off by more: its focal length by CALIBRATION_SIGMA.
+_KEPT_FOCAL = 0.001  # relative: some ten degrees of temperature
 _KEPT_CENTRE = 0.001  # of the longer side
 _KEPT = {"k1": 0.003, "k2": 0.006, "p1": 2e-4, "p2": 2e-4, "k3": 0.006, "k4": 0.006, "k5": 0.006, "k6": 0.006}
 
@@ -76,14 +77,15 @@ def free(camera: Camera, focal: FocalPrior | None) -> Interior:
 def calibrated(camera: Camera, calibration: Camera, covariance: Array | None = None) -> Interior:
     """Return the free parameters of ``camera``, known from a ``calibration`` with the covariance (q, q) of its adjustment.
 
-    Without a covariance, or where it belongs to another model, the parameters are known as well as lenses keep.
+    What lenses keep from flight to flight is added to it.
     """
     names = PARAMETERS[camera.model]
     brown = calibration.brown()
     basis = _basis(names)
     known = np.array([brown[np.flatnonzero(column)[0]] for column in basis.T])
     side = max(camera.width, camera.height)
-    prior = FocalPrior(float(brown[:2].mean()), CALIBRATION_SIGMA * float(brown[:2].mean()))
+    kept = CALIBRATION_SIGMA if covariance is None else _KEPT_FOCAL
+    prior = FocalPrior(float(brown[:2].mean()), kept * float(brown[:2].mean()))
     sigmas = {**_KEPT, "cx": _KEPT_CENTRE * side, "cy": _KEPT_CENTRE * side}
     information = _information(names, prior, sigmas)
     if covariance is not None and covariance.shape == information.shape:

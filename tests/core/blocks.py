@@ -90,8 +90,8 @@ class Flown:
         return solution.errors[chosen] + given[chosen] - FRAME.to_crs(self.true_points[chosen])
 
 
-def flown(scene: Scene, *, held: interior.Interior | None = None) -> Flown:
-    """Fly, observe with noise, and orient freely (``held`` is a fixed calibration whose camera stands in ``calibration``)."""
+def flown(scene: Scene, *, calibration: Camera | None = None) -> Flown:
+    """Fly, observe with noise, and orient freely; a ``calibration`` is held."""
     random = np.random.default_rng([scene.seed, 99])
     camera = lens(*scene.size, scene.focal)
     gsd = scene.height / scene.focal
@@ -108,7 +108,7 @@ def flown(scene: Scene, *, held: interior.Interior | None = None) -> Flown:
     noisy = centres + random.standard_normal(centres.shape) * [scene.gnss[0], scene.gnss[0], scene.gnss[1]] + scene.bias
     sigmas = np.tile(scene.gnss if scene.declared else (1.0, 1.5), (len(views), 1))
     gnss = Gnss(np.arange(len(views)), FRAME.to_crs(noisy), sigmas, scene.declared, np.zeros(3))
-    assembly = oriented(views, ground, rays, scene, random)
+    assembly = oriented(views, ground, rays, scene, random, calibration)
     return Flown(scene, assembly, points, gnss, camera, views, laid, gsd)
 
 

@@ -175,10 +175,26 @@ def test_two_runs_are_the_same_to_the_bit(small):
     assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
 
 
+def tracks(*seen):
+    """Return the rays of points given as {view: (x, y)}."""
+    start = np.concatenate([[0], np.cumsum([len(s) for s in seen])]).astype(np.int64)
+    view = np.array([v for s in seen for v in s], np.int64)
+    return bundle.Rays(start, view, np.array([xy for s in seen for xy in s.values()], float))
+
+
 def test_an_even_choice_takes_long_tracks_and_leaves_no_patch_empty():
     """Two photographs; points 0 to 2 share a patch, and the longest of them is taken; point 3 alone fills another."""
-    start = np.array([0, 2, 5, 7, 9], np.int64)
-    view = np.array([0, 1, 0, 1, 2, 0, 1, 0, 1], np.int64)
-    xy = np.array([[1, 1], [1, 1], [2, 2], [2, 2], [2, 2], [3, 3], [3, 3], [400, 300], [401, 301]], float)
-    sizes = np.array([[480, 360]] * 3)  # patches of 10 pixels
-    assert even_choice(bundle.Rays(start, view, xy), np.zeros(4), sizes).tolist() == [False, True, False, True]
+    rays = tracks(
+        *[{0: (1, 1), 1: (1, 1), 2: (1, 1), 3: (1, 1)}] * 60,  # links that are held
+        {0: (12, 2), 1: (12, 2)}, {0: (13, 3), 1: (13, 3), 2: (13, 3)}, {0: (14, 3), 1: (14, 3)}, {0: (400, 300), 1: (401, 301)},
+    )  # fmt: skip
+    chosen = even_choice(rays, np.zeros(64), np.array([[480, 360]] * 4))  # patches of 10 pixels
+    assert chosen[60:].tolist() == [False, True, False, True]
+    assert chosen[:60].sum() == 50
+
+
+def test_an_even_choice_keeps_every_link():
+    """The only points that tie photograph 3 to the others lie in a patch that is full."""
+    rays = tracks(*[{0: (5, 5), 1: (5, 5), 2: (5, 5)}] * 60, *[{2: (5, 5), 3: (5, 5)}] * 7)
+    chosen = even_choice(rays, np.zeros(67), np.array([[480, 360]] * 4))
+    assert chosen[60:].all()
