@@ -282,10 +282,11 @@ def _loose_notes(adjusted: Adjusted, block: Block) -> list[str]:
     if not loose.any() or loose.mean() > 0.5:
         return []
     names = [view.name for view, one in zip(block.views, loose, strict=True) if one]
+    are = "is" if len(names) == 1 else "are"
     return [
-        f"{listed(names)} {'is' if len(names) == 1 else 'are'} known to {sigma[loose].max():.1f} m only against the rest of the "
-        f"block, which is known to {np.median(sigma):.2f} m: too few tie points join them to more than one photograph of it; do not use "
-        "their ground, or give control points on it."
+        f"{listed(names)} {are} known to {sigma[loose].max():.1f} m only against the rest of the block, which is known to "
+        f"{np.median(sigma):.2f} m: too few tie points join them to more than one photograph of it; do not use their ground, or give "
+        "control points on it."
     ]
 
 
