@@ -7,7 +7,7 @@ overtakes the texture. The first Gaussian is the one that has that there. Its si
 The second lifts the fine against the coarse. The power of sand's texture falls with the frequency, so that coarse texture drowns
 fine texture, and a scale space holds fewer extrema than it has room for: whitening, as correlation has long used it (Knapp
 and Carter 1976), makes more of them. It also lifts what noise is left. So ``w`` is the largest, up to 0.8, with which texture
-still makes up three quarters of the variance: two photographs of the same ground then correlate by as much.
+still makes up 72 % of the variance: two photographs of the same ground then correlate by as much.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .signal import SLOPE
 CROSSOVER = 0.1874  # cycles per pixel where nothing tells the photograph's own: sigma 1 px
 _COARSE = 2.0  # sigma in pixels of the second Gaussian
 _MOST = 0.8  # weight of the second Gaussian
-_SHARE = 0.75  # of the variance that texture makes up
+_SHARE = 0.72  # of the variance that texture makes up; tried from 0.6 to 0.9
 _SIGMAS = (0.3, 1.5)  # px; a narrower Gaussian is none, a wider one leaves no band below the second
 _REACH = 3.5  # sigmas after which a Gaussian is cut
 _FINEST = 1 << 22  # what is filtered is held in whole numbers up to about this

@@ -46,9 +46,9 @@ def write_report(
         )
     if method == "bandpass":
         report.text(
-            "Below the finest period, in pixels, a photograph holds more noise than texture: what the three colours do not share is "
-            "noise. The low-pass (sigma in pixels) follows it, and so does the weight of the coarse that is taken off to lift the "
-            "fine. Without a period (fewer than three colours, copies of one colour, or too little ground) the low-pass is 1 pixel."
+            "Below the finest period, in pixels, a photograph holds more noise than texture: what its three colours do not share "
+            "is noise. The low-pass (sigma in pixels) follows it, and so does the weight of the coarse that is taken off to lift "
+            "the fine. Without a period (fewer than three colours, copies of one, too little ground) the low-pass is 1 pixel."
         )
     if notes:
         report.heading("Areas to ignore")

@@ -212,7 +212,7 @@ def test_real_sand_gains_contrast(shared_data, tmp_path):
         return np.median(tiles.reshape(tiles.shape[0] // 32, 32, -1, 32).std(axis=(1, 3)))
 
     assert spread(cv2.cvtColor(source[::4, ::4], cv2.COLOR_BGR2GRAY)) < 12.0
-    assert 35.0 < spread(image) < 65.0  # a normal distribution through the arctangent has 43
+    assert 27.0 < spread(image) < 50.0  # a normal distribution through the arctangent of its half has 35
     assert abs(float(image.mean()) - 127.5) < 3.0
 
 

@@ -125,7 +125,7 @@ def test_bandpass_against_brute_force(bits, window, masked):
     assert contrast.crossover is None
     assert contrast.low_pass == pytest.approx(1.0, abs=1e-3)
     weight = contrast.weight
-    assert 0.55 < weight < 0.7
+    assert 0.7 < weight < 0.8
     passed = gaussian_mean(total.values, 1.0, 4, valid) - weight * gaussian_mean(total.values, 2.0, 7, valid)
     # Of white noise is left the root of 1 / (4 pi s1^2) - 2 w / (2 pi (s1^2 + s2^2)) + w^2 / (4 pi s2^2).
     gain = math.sqrt(1 / (4 * math.pi) - 2 * weight / (10 * math.pi) + weight**2 / (16 * math.pi))
@@ -165,8 +165,8 @@ def test_the_band_follows_the_noise():
     fine, weights = zip(*((b.fine, b.weight) for b in map(band_of, np.linspace(0.1, 0.8, 30))), strict=True)
     assert (np.diff(fine) <= 0).all()
     assert (np.diff(weights) >= -1e-6).all()
-    for f in (0.13, 0.17, 0.2):
-        assert texture_share(band_of(f), f) == pytest.approx(0.75, abs=1e-4)
+    for f in (0.13, 0.15, 0.18):
+        assert texture_share(band_of(f), f) == pytest.approx(0.72, abs=1e-4)
 
 
 def micmac_reference(values, window, floor, valid=None):
