@@ -27,7 +27,7 @@ _COARSE = 2.0  # sigma in pixels of the second Gaussian
 _MOST = 0.8  # weight of the second Gaussian
 _SHARE = 0.72  # of the variance that texture makes up; tried from 0.6 to 0.9
 _SIGMAS = (0.3, 1.5)  # px; a narrower Gaussian is none, a wider one leaves no band below the second
-_REACH = 3.5  # sigmas after which a Gaussian is cut
+_REACH = 3.0  # sigmas after which a Gaussian is cut
 _FINEST = 1 << 22  # what is filtered is held in whole numbers up to about this
 _FREQUENCIES = np.linspace(1 / 40, 0.5, 200)  # cycles per pixel: what the surroundings of a feature hold
 
@@ -80,14 +80,15 @@ def band_passed(
     kernels = [_kernel(sigma) for sigma in (band.fine, band.coarse)]
     present = values.astype(np.float32) if valid is None else np.where(valid, values, 0).astype(np.float32)
     there = None if valid is None else valid.astype(np.float32)
-    first, second = (_mean(present, there, kernel) for kernel in kernels)
-    second *= np.float32(-band.weight * scale)
-    out = cv2.addWeighted(first, scale, second, 1.0, 0.0)
+    first = _mean(present, there, kernels[0], scale)
+    second = _mean(present, there, kernels[1], -band.weight * scale)
+    # Rounded to whole numbers, of which sums are exact.
+    out = np.asarray(cv2.add(first, second, dtype=cv2.CV_32S), np.int32)
     side = len(kernels[1])
     fine = np.zeros(side)
     fine[(side - len(kernels[0])) // 2 :][: len(kernels[0])] = kernels[0]
     (a, b), c = ((k @ k) ** 2 for k in (fine, kernels[1])), (fine @ kernels[1]) ** 2
-    return np.rint(out).astype(np.int32), scale, math.sqrt(a - 2 * band.weight * c + band.weight**2 * b)
+    return out, scale, math.sqrt(a - 2 * band.weight * c + band.weight**2 * b)
 
 
 def _kernel(sigma: float) -> NDArray[np.float64]:
@@ -95,14 +96,18 @@ def _kernel(sigma: float) -> NDArray[np.float64]:
     return np.asarray(cv2.getGaussianKernel(2 * reach + 1, sigma, cv2.CV_64F)[:, 0] if reach else np.ones(1))
 
 
-def _mean(image: NDArray[np.float32], there: NDArray[np.float32] | None, kernel: NDArray[np.float64]) -> NDArray[np.float32]:
+def _mean(
+    image: NDArray[np.float32], there: NDArray[np.float32] | None, kernel: NDArray[np.float64], factor: float
+) -> NDArray[np.float32]:
+    """Return the mean of what is there, times a factor."""
+
+    def filtered(part: NDArray[np.float32], times: float) -> NDArray[np.float32]:
+        across = kernel * times
+        return np.asarray(cv2.sepFilter2D(part, cv2.CV_32F, across, kernel, borderType=cv2.BORDER_REFLECT), np.float32)
+
     if len(kernel) == 1:
-        return image
-
-    def filtered(part: NDArray[np.float32]) -> NDArray[np.float32]:
-        return np.asarray(cv2.sepFilter2D(part, cv2.CV_32F, kernel, kernel, borderType=cv2.BORDER_REFLECT), np.float32)
-
-    smooth = filtered(image)
+        return image * np.float32(factor)
+    smooth = filtered(image, factor)
     if there is not None:
-        smooth /= np.maximum(filtered(there), np.float32(1e-6))
+        smooth /= np.maximum(filtered(there, 1.0), np.float32(1e-6))
     return smooth

@@ -126,7 +126,7 @@ def test_bandpass_against_brute_force(bits, window, masked):
     assert contrast.low_pass == pytest.approx(1.0, abs=1e-3)
     weight = contrast.weight
     assert 0.7 < weight < 0.8
-    passed = gaussian_mean(total.values, 1.0, 4, valid) - weight * gaussian_mean(total.values, 2.0, 7, valid)
+    passed = gaussian_mean(total.values, 1.0, 3, valid) - weight * gaussian_mean(total.values, 2.0, 6, valid)
     # Of white noise is left the root of 1 / (4 pi s1^2) - 2 w / (2 pi (s1^2 + s2^2)) + w^2 / (4 pi s2^2).
     gain = math.sqrt(1 / (4 * math.pi) - 2 * weight / (10 * math.pi) + weight**2 / (16 * math.pi))
     local = reference(passed, window, math.sqrt(3) * gain, "symmetric", valid)
@@ -136,19 +136,20 @@ def test_bandpass_against_brute_force(bits, window, masked):
     # A level of 16 bits is held in sixteen parts, and rounded: at the floor of 0.5 that is a few levels in a hundred.
     assert np.abs(out - expected)[defined].max() < 1.0
     assert (out[~defined] == 128).all()
-    assert contrast.floor == pytest.approx(math.sqrt(3) * gain, rel=2e-3)
+    assert contrast.floor == pytest.approx(math.sqrt(3) * gain, rel=5e-3)
 
 
 def test_a_band_by_hand():
-    # One 1000 among zeros. The first Gaussian's largest weight is (1 / sum of exp(-k^2 / 2))^2 = (1 / 2.50661)^2 = 0.159157, the
-    # second's (1 / sum of exp(-k^2 / 8), |k| <= 7)^2 = (1 / 5.01193)^2 = 0.039810: 159.157 - 0.5 * 39.810 = 139.252.
+    # One 1000 among zeros. The first Gaussian's largest weight is (1 / sum of exp(-k^2 / 2), |k| <= 3)^2 = (1 / 2.50596)^2, that is
+    # 0.159241, the second's (1 / sum of exp(-k^2 / 8), |k| <= 6)^2 = (1 / 5.00812)^2 = 0.039870: 159.241 - 19.935 = 139.306.
     values = np.zeros((41, 41), np.uint16)
     values[20, 20] = 1000
     passed, scale, gain = band_passed(values, 765, Band(1.0, 2.0, 0.5))
-    assert passed[20, 20] / scale == pytest.approx(139.252, abs=0.02)
+    assert passed[20, 20] / scale == pytest.approx(139.306, abs=0.02)
     assert passed.sum() / scale == pytest.approx(500.0, abs=0.1)
     # 1 / (4 pi) - 1 / (10 pi) + 1 / (64 pi) = 0.079577 - 0.031831 + 0.004974 = 0.052720, and its root.
-    assert gain == pytest.approx(0.22961, abs=2e-4)
+    # Cut at three sigmas, the Gaussians let a little more through.
+    assert gain == pytest.approx(0.22961, abs=5e-4)
     flat = band_passed(np.full((20, 20), 765, np.uint16), 765, Band(0.0, 2.0, 0.8))
     assert flat[0] / scale == pytest.approx(np.full((20, 20), 153.0), abs=0.1)
 
