@@ -140,7 +140,7 @@ def test_bandpass_against_brute_force(bits, window, masked):
 
 
 def test_a_band_by_hand():
-    # One 1000 among zeros. The first Gaussian's largest weight is (1 / sum of exp(-k^2 / 2), |k| <= 3)^2 = (1 / 2.50596)^2, that is
+    # One 1000 among zeros. The first Gaussian's largest weight is (1 / sum of exp(-k^2 / 2), |k| <= 3)^2 = (1 / 2.50596)^2, or
     # 0.159241, the second's (1 / sum of exp(-k^2 / 8), |k| <= 6)^2 = (1 / 5.00812)^2 = 0.039870: 159.241 - 19.935 = 139.306.
     values = np.zeros((41, 41), np.uint16)
     values[20, 20] = 1000
