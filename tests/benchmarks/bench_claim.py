@@ -8,9 +8,9 @@ With --small it takes six photographs of each beach.
 
 Check points carry the noise of their survey and of their marks, which is the same in all cases and larger than what they differ
 by. So the truth of the simulation is asked too, without control: the model is laid on the true camera centres, and ``centres``
-(mm) is the root mean square of what is left there. Tie points are compared with the true surface in cells of 5 m: ``shape`` (mm) is
-the root mean square of the cells' medians after the best plane, what the block is bent by; ``height`` (mm) the normalised
-median deviation of single points from their cell's median, what the noise of the photographs leaves.
+(mm) is the root mean square of what is left there. Tie points are compared with the true surface in cells of 5 m: ``shape``
+(mm) is the root mean square of the cells' medians after the best plane, what the block is bent by; ``height`` (mm) the
+normalised median deviation of single points from their cell's median, what the noise of the photographs leaves.
 """
 
 from __future__ import annotations
