@@ -31,9 +31,10 @@ class Enhance(StepAlgorithm):
             "METHOD",
             tr("Method"),
             tr(
-                "bandpass: the noise of single pixels is taken off, then as arctan; it gives the most tie points on sand. "
-                "arctan: each pixel against the mean and deviation of its window, through an arc tangent (Rosu et al. 2015). "
-                "micmac: MicMac's variant. equalize: the image's whole histogram. none: only reduced to 8 bits."
+                "bandpass: takes off as much fine noise as each photograph has and lifts its fine texture, then as arctan; it "
+                "gives the most tie points on sand. arctan: each pixel against the mean and deviation of its window, through an "
+                "arc tangent (Rosu et al. 2015). micmac: MicMac's variant. equalize: the image's whole histogram. none: only "
+                "reduced to 8 bits."
             ),
             ("arctan", "micmac", "equalize", "none", "bandpass"),
             default="bandpass",

@@ -492,8 +492,8 @@
    <translation>Méthode</translation>
   </message>
   <message>
-   <source>bandpass: the noise of single pixels is taken off, then as arctan; it gives the most tie points on sand. arctan: each pixel against the mean and deviation of its window, through an arc tangent (Rosu et al. 2015). micmac: MicMac's variant. equalize: the image's whole histogram. none: only reduced to 8 bits.</source>
-   <translation>bandpass : le bruit des pixels isolés est ôté, puis comme arctan ; c'est ce qui donne le plus de points de liaison sur le sable. arctan : chaque pixel rapporté à la moyenne et à l'écart type de sa fenêtre, par un arc tangente (Rosu et al. 2015). micmac : la variante de MicMac. equalize : l'histogramme entier de l'image. none : seulement ramené à 8 bits.</translation>
+   <source>bandpass: takes off as much fine noise as each photograph has and lifts its fine texture, then as arctan; it gives the most tie points on sand. arctan: each pixel against the mean and deviation of its window, through an arc tangent (Rosu et al. 2015). micmac: MicMac's variant. equalize: the image's whole histogram. none: only reduced to 8 bits.</source>
+   <translation>bandpass : ôte autant de bruit fin que chaque photographie en a et relève sa texture fine, puis comme arctan ; c'est ce qui donne le plus de points de liaison sur le sable. arctan : chaque pixel rapporté à la moyenne et à l'écart type de sa fenêtre, par un arc tangente (Rosu et al. 2015). micmac : la variante de MicMac. equalize : l'histogramme entier de l'image. none : seulement ramené à 8 bits.</translation>
   </message>
   <message>
    <source>Side of the square window in pixels, an odd number. Larger windows keep more of the broad shapes.</source>

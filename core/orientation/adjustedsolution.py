@@ -285,8 +285,8 @@ def _loose_notes(adjusted: Adjusted, block: Block) -> list[str]:
     are = "is" if len(names) == 1 else "are"
     return [
         f"{listed(names)} {are} known to {sigma[loose].max():.1f} m only against the rest of the block, which is known to "
-        f"{np.median(sigma):.2f} m: too few tie points join them to more than one photograph of it; do not use their ground, or give "
-        "control points on it."
+        f"{np.median(sigma):.2f} m: too few tie points join them to more than one photograph of it; do not use their ground, or "
+        "give control points on it."
     ]
 
 

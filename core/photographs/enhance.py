@@ -23,7 +23,7 @@ from .listing import some
 from .poses import Outlines, find_outlines
 
 _FOLDER = "enhanced"
-_VERSION = 2  # of the algorithms and of the files; raised when the same request gives other pixels
+_VERSION = 3  # of the algorithms and of the files; raised when the same request gives other pixels
 
 
 @dataclass(frozen=True)

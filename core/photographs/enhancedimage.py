@@ -52,7 +52,7 @@ def make_image(
 
     ``outline`` (hexadecimal WKB, pixels) is what is masked; None for nothing.
     """
-    total = read_channel_sum(Path(path), decode(Photograph, photograph))
+    total = read_channel_sum(Path(path), decode(Photograph, photograph), means=method == "bandpass")
     height, width = total.values.shape
     valid = None if outline is None else unmasked(shapely.from_wkb(outline), width, height)
     grey, contrast = enhance_photograph(total, method, window, valid)

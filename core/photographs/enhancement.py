@@ -5,10 +5,10 @@ by the mean and the standard deviation of the square window around it and compre
 by one fixed affine function, so that the same ground looks the same in two photographs.
 The ``micmac`` method is what MicMac's "SFS" does: a global tone curve that the local term may shift by at most 64.
 
-The ``bandpass`` method takes the noise off first, by a narrow Gaussian, and then goes on as arctan: local contrast normalisation
-(Jarrett, Kavukcuoglu, Ranzato and LeCun 2009) of a band of scales. On sand a single pixel is mostly noise. The
-arctangent folds that into the signal for good, and the standard deviation it divides by is that of the noise; once it is
-taken off, what is left of the texture fills the range.
+The ``bandpass`` method first takes a band of scales, which follows the photograph's own signal and noise (``bandpass.py``), and
+then goes on as arctan, with twice the standard deviation: local contrast normalisation (Jarrett, Kavukcuoglu, Ranzato and LeCun
+2009) of that band. On very bare sand a single pixel is mostly noise. The arctangent folds that into the signal for good, and
+the standard deviation it divides by is that of the noise; once it is taken off, what is left of the texture fills the range.
 
 Where pixels are masked, sums over the window become sums over its unmasked pixels (normalised convolution), and where those are
 less than a quarter of the window nothing is defined.
@@ -17,7 +17,7 @@ less than a quarter of the window nothing is defined.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import cv2
@@ -25,14 +25,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .bandpass import CROSSOVER, band_of, band_passed
 from .reading import ChannelSum, mean_level
+from .signal import crossover
 
 Method = Literal["arctan", "micmac", "equalize", "none", "bandpass"]
 _BINS = 65536  # of MicMac's histograms
 _MARGIN = 64.0  # grey levels by which MicMac's local term may shift the tone
-_LOW_PASS = 1.0  # sigma in pixels of the Gaussian before "bandpass"
-_REACH = 4  # pixels after which it is cut
-_FINEST = 1 << 22  # what is low-passed is held in whole numbers up to about this
+_WIDE = 2.0  # standard deviations that "bandpass" maps to half of the range; less of it is bent than by the paper's one
 _EVERY = 16  # the statistics are taken from every 16th row
 _LEAST_SHARE = 0.25  # of a window's pixels that must be unmasked
 _UNDEFINED = 128  # grey level of masked and undefined pixels: flat, so that nothing is found there
@@ -53,7 +53,9 @@ class Contrast:
     ``noise`` is the noise of one pixel, finest texture included; ``levels`` the DN per channel from black to white;
     ``mean_sigma`` the mean standard deviation in the window, ``floor`` the least that is believed, ``below_percent`` the share
     of pixels where it is less. These three are None for methods without a window. ``masked_percent`` is the share of all pixels
-    that cannot hold key points, None without a mask.
+    that cannot hold key points, None without a mask. ``crossover`` is the frequency (cycles per pixel) at which noise overtakes
+    texture, None where it is not told or not asked for; ``low_pass`` and ``weight`` are the sigma (px) and the weight of the
+    two Gaussians of ``bandpass``, None for other methods.
     """
 
     noise: float
@@ -62,6 +64,9 @@ class Contrast:
     floor: float | None = None
     below_percent: float | None = None
     masked_percent: float | None = None
+    crossover: float | None = None
+    low_pass: float | None = None
+    weight: float | None = None
 
 
 def noise_floor(channels: int, step: float = 1.0) -> float:
@@ -87,7 +92,8 @@ def enhance_photograph(
         ``arctan``: ``127.5 + 127.5 * local``, rounded, with ``local = atan((x - mean) / max(sigma, floor)) / (pi / 2)``
         over the window, reflected at the border with the edge pixel repeated.
         ``micmac``: ``tone + margin * local``, truncated, with the edge pixel replicated; see ``micmac_tables``.
-        ``bandpass``: as ``arctan``, of ``low_passed`` values, and with the floor that is left of the noise by that.
+        ``bandpass``: as ``arctan``, of ``band_passed`` values, with the floor that is left of the noise by that, and with
+        twice the sigma.
         ``equalize``: 255 times the inclusive share of pixels that are not brighter, rounded. (A gamma curve before
         it would change nothing.)
         ``none``: the mean of the channels at 8 bits. JPG, TIFF and PNG are gamma-coded already: no curve is applied.
@@ -108,11 +114,14 @@ def enhance_photograph(
     if not has_window(method):
         grey = mean_level(photograph) if method == "none" else equalized_table(values, valid)[values]
         return _flat(grey, kept), Contrast(noise, levels, masked_percent=masked)
-    unit = step  # one DN in the values whose contrast is taken
+    unit, wide = step, 1.0  # one DN in the values whose contrast is taken
     floor = noise_floor(photograph.channels, step)
+    frequency, band = None, None
     if method == "bandpass":
-        values, scale, gain = low_passed(values, photograph.white, valid)
-        unit, floor = scale * step, floor * scale * gain
+        frequency = crossover(photograph.means, step, valid)
+        band = band_of(frequency or CROSSOVER)
+        values, scale, gain = band_passed(values, photograph.white, band, valid)
+        unit, floor, wide = scale * step, floor * scale * gain, _WIDE
     half = window // 2
     counts = _NO_COUNTS if valid is None else _window_counts(valid, method, window)
     present = values if valid is None else np.where(valid, values, np.zeros((), values.dtype))  # adds nothing to the sums
@@ -125,10 +134,11 @@ def enhance_photograph(
         rows, columns = (reflected(n, half) for n in values.shape)
     out = np.empty(values.shape, np.uint8)
     sigma, below, count = _local_contrast(
-        present, counts, _NO_PIXELS if kept is None else kept, rows, columns, floor, tone, margin, out
+        present, counts, _NO_PIXELS if kept is None else kept, rows, columns, floor, wide, tone, margin, out
     )
     mean_sigma, below_percent = (sigma / count / unit, 100.0 * below / count) if count else (None, None)
-    return _flat(out, kept), Contrast(noise, levels, mean_sigma, floor / unit, below_percent, masked)
+    contrast = Contrast(noise, levels, mean_sigma, floor / unit, below_percent, masked, frequency)
+    return _flat(out, kept), contrast if band is None else replace(contrast, low_pass=band.fine, weight=band.weight)
 
 
 def usable(valid: NDArray[np.bool_], method: Method, window: int) -> NDArray[np.bool_]:
@@ -136,30 +146,6 @@ def usable(valid: NDArray[np.bool_], method: Method, window: int) -> NDArray[np.
     if not has_window(method):
         return valid
     return np.asarray(valid & (_window_counts(valid, method, window) >= _LEAST_SHARE * window * window))
-
-
-def low_passed(
-    values: NDArray[Any], white: int, valid: NDArray[np.bool_] | None = None
-) -> tuple[NDArray[np.uint32], float, float]:
-    """Return a Gaussian mean of values (rows, columns) in whole numbers, the number of those in one, and the gain on white noise.
-
-    Masked pixels do not enter it; where there are only those it is 0. The border is reflected.
-    """
-    kernel = cv2.getGaussianKernel(2 * _REACH + 1, _LOW_PASS, cv2.CV_32F)
-    scale = 2.0 ** math.floor(math.log2(_FINEST / white))
-
-    def mean(image: NDArray[np.float32]) -> NDArray[np.float32]:
-        return np.asarray(cv2.sepFilter2D(image, cv2.CV_32F, kernel, kernel, borderType=cv2.BORDER_REFLECT), np.float32)
-
-    if valid is None:
-        smooth = mean(values.astype(np.float32))
-    else:
-        share = mean(valid.astype(np.float32))
-        smooth = mean(np.where(valid, values, 0).astype(np.float32))
-        smooth /= np.maximum(share, np.float32(1e-6))
-    smooth *= np.float32(scale)
-    smooth += np.float32(0.5)
-    return smooth.astype(np.uint32), scale, float((kernel.astype(float) ** 2).sum())
 
 
 def reflected(count: int, half: int) -> NDArray[np.int64]:
@@ -243,11 +229,14 @@ def _local_contrast(
     rows: NDArray[np.int64],
     columns: NDArray[np.int64],
     floor: float,
+    wide: float,
     tone: NDArray[np.float32],
     margin: NDArray[np.float32],
     out: NDArray[np.uint8],
 ) -> tuple[float, float, float]:
-    """Fill ``out`` with ``tone + margin * local``; return the sums of sigma, of pixels below the floor, and of pixels.
+    """Fill ``out`` with ``tone + margin * local``, sigma times ``wide``.
+
+    Return the sums of sigma, of pixels below the floor, and of pixels.
 
     ``counts`` is the number of unmasked pixels in each window, or empty; masked ``values`` must be 0. ``kept`` says which pixels
     count in the sums that are returned; empty for all.
@@ -297,7 +286,7 @@ def _local_contrast(
         for c in range(width):
             mean = sum_1[c] * share[c]
             variance = sum_2[c] * share[c] - mean * mean
-            sigma = np.float32(math.sqrt(max(variance, floor * floor)))
+            sigma = np.float32(wide * math.sqrt(max(variance, floor * floor)))
             distance = np.float32(float(present[c]) - mean)
             size = abs(distance)
             # atan(size / sigma) from the ratio that lies in [0, 1].

@@ -42,7 +42,13 @@ def write_report(
         report.text(
             "Noise floor: a standard deviation in the window below the square root of the number of channels (1 DN in each) is "
             "taken as that. A pixel's noise includes the finest texture."
-            + (" Here both are of the image after the noise of single pixels was taken off." if method == "bandpass" else "")
+            + (" Here both are of the image that the band of scales leaves." if method == "bandpass" else "")
+        )
+    if method == "bandpass":
+        report.text(
+            "Below the finest period, in pixels, a photograph holds more noise than texture: what its three colours do not share "
+            "is noise. The low-pass (sigma in pixels) follows it, and so does the weight of the coarse that is taken off to lift "
+            "the fine. Without a period (fewer than three colours, copies of one, too little ground) the low-pass is 1 pixel."
         )
     if notes:
         report.heading("Areas to ignore")
@@ -61,6 +67,9 @@ def write_report(
             "sigma / noise",
             "below the floor (%)",
             "masked (%)",
+            "finest period",
+            "low-pass",
+            "weight",
         ],
         [(p.name, *_numbers(contrasts[p.name])) for p in photographs],
     )
@@ -89,7 +98,9 @@ def _chosen(photographs: list[Photograph], contrasts: dict[str, Contrast]) -> li
 def _numbers(contrast: Contrast) -> tuple[float | None, ...]:
     sigma, noise = contrast.mean_sigma, contrast.noise
     ratio = sigma / noise if sigma is not None and noise else None
-    return contrast.levels, noise, contrast.floor, sigma, ratio, contrast.below_percent, contrast.masked_percent
+    period = None if contrast.crossover is None else 1 / contrast.crossover
+    band = period, contrast.low_pass, contrast.weight
+    return contrast.levels, noise, contrast.floor, sigma, ratio, contrast.below_percent, contrast.masked_percent, *band
 
 
 def _show(report: Report, survey: Survey, photograph: Photograph, image: Path, contrast: Contrast) -> None:

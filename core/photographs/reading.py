@@ -8,7 +8,8 @@ from __future__ import annotations
 import io
 import re
 import struct
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
@@ -21,7 +22,8 @@ from PIL import Image
 from ..errors import InputError
 from ..files import bytes_digest
 from ..survey import Photograph
-from .raw import SATURATION, decode_raw, summed
+from .raw import SATURATION, colours, decode_raw, summed
+from .signal import STRIP, block_means, strip_starts
 
 JPG = frozenset({".jpg", ".jpeg", ".jpe"})
 TIFF = frozenset({".tif", ".tiff"})
@@ -59,8 +61,9 @@ class ChannelSum:
     ``values`` (rows, columns) are uint16 for 8-bit photographs and uint32 for 16-bit and RAW ones; ``white`` is the
     largest value that can occur: ``channels * 255`` or ``channels * 65535``. ``step`` is what one digital number (DN) of
     the file is in ``values``: 1, and for RAW what its levels were scaled by. ``linear`` tells that the values are proportional to
-    light (RAW), not gamma-coded. The sum keeps what an 8-bit luma rounds away: up to log2(3) = 1.6 bits where the
-    three channels see one grey signal, as on sand.
+    light (RAW), not gamma-coded. ``means`` (strips, 8, n, channels) are ``block_means`` of strips of the colours, in the unit of
+    ``values``; empty where nobody asked for them. The sum keeps what an 8-bit luma rounds away: up to log2(3) = 1.6 bits where
+    the three channels see one grey signal, as on sand.
     """
 
     values: NDArray[Any]
@@ -68,6 +71,7 @@ class ChannelSum:
     white: int
     step: float = 1.0
     linear: bool = False
+    means: NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
 
 
 def is_raw(name: str) -> bool:
@@ -75,8 +79,10 @@ def is_raw(name: str) -> bool:
     return PurePosixPath(name).suffix.casefold() in RAW
 
 
-def read_channel_sum(path: Path, photograph: Photograph) -> ChannelSum:
+def read_channel_sum(path: Path, photograph: Photograph, *, means: bool = False) -> ChannelSum:
     """Return the sum of a photograph's channels, after making sure that the file is the one the survey lists.
+
+    With ``means`` it holds those of the colours too.
 
     Raises
     ------
@@ -92,10 +98,24 @@ def read_channel_sum(path: Path, photograph: Photograph) -> ChannelSum:
     try:
         if is_raw(photograph.name):
             raw = decode_raw(data)
-            return ChannelSum(summed(raw), raw.channels, raw.channels * SATURATION, raw.step, linear=True)
-        return channel_sum(decode_pixels(data))
+            total = ChannelSum(summed(raw), raw.channels, raw.channels * SATURATION, raw.step, linear=True)
+            # Strips start where every colour filter array starts again.
+            parts = (colours(replace(raw, values=raw.values[top : top + STRIP])) for top in _starts(raw.values, means))
+            return replace(total, means=_means(parts))
+        pixels = decode_pixels(data)
+        parts = (pixels[top : top + STRIP].reshape(STRIP, pixels.shape[1], -1) for top in _starts(pixels, means))
+        return replace(channel_sum(pixels), means=_means(parts))
     except ValueError as error:
         raise InputError(f"The photograph {path} is {error}: copy it again from the camera.") from error
+
+
+def _starts(pixels: NDArray[Any], wanted: bool) -> range:
+    return strip_starts(len(pixels)) if wanted else range(0)
+
+
+def _means(strips: Iterable[NDArray[Any]]) -> NDArray[np.float32]:
+    found = [block_means(strip) for strip in strips]
+    return np.stack(found) if found else np.zeros(0, np.float32)
 
 
 def decode_pixels(data: bytes) -> NDArray[Any]:

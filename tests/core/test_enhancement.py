@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from strandline.core.photographs.bandpass import Band, band_of, band_passed, texture_share
 from strandline.core.photographs.enhancement import (
     enhance_photograph,
     equalized_table,
-    low_passed,
     micmac_tables,
     noise_floor,
     pixel_noise,
@@ -101,46 +101,73 @@ def test_arctan_against_brute_force(bits, channels, window, masked):
             assert (~defined).sum() > (~valid).sum()
 
 
-def gaussian_mean(values, valid=None):
-    """A Gaussian mean of sigma 1 px over 9 x 9 pixels, each summed on its own, of valid pixels."""
-    weights = np.exp(-(np.arange(-4, 5) ** 2) / 2.0)
+def gaussian_mean(values, sigma, reach, valid=None):
+    """A Gaussian mean cut at ``reach`` pixels, each window summed on its own, of valid pixels."""
+    weights = np.exp(-(np.arange(-reach, reach + 1) ** 2) / (2 * sigma**2)) if reach else np.ones(1)
     weights = np.outer(weights, weights)
-    padded = np.pad(values.astype(float), 4, mode="symmetric")
-    there = np.pad(np.ones(values.shape) if valid is None else valid, 4, mode="symmetric")
-    out = np.zeros(values.shape)
+    padded = np.pad(values.astype(float), reach, mode="symmetric")
+    there = np.pad(np.ones(values.shape) if valid is None else valid, reach, mode="symmetric")
+    out, side = np.zeros(values.shape), 2 * reach + 1
     for r in range(values.shape[0]):
         for c in range(values.shape[1]):
-            w = weights * there[r : r + 9, c : c + 9]
-            out[r, c] = (w * padded[r : r + 9, c : c + 9]).sum() / max(w.sum(), 1e-300)
+            w = weights * there[r : r + side, c : c + side]
+            out[r, c] = (w * padded[r : r + side, c : c + side]).sum() / max(w.sum(), 1e-300)
     return out
 
 
 @pytest.mark.parametrize("masked", [False, True])
 @pytest.mark.parametrize(("bits", "window"), [(8, 11), (12, 25), (16, 37)])
 def test_bandpass_against_brute_force(bits, window, masked):
+    # So small a photograph tells nothing of its noise: the first Gaussian has 1 px, and the second the weight that belongs to it.
     total = channel_sum(sand(bits))
     valid = a_mask(total.values.shape) if masked else None
-    smooth = gaussian_mean(total.values, valid)
-    # Of white noise is left the root of the sum of squared weights, 0.2821: 1 / (2 sqrt(pi)).
-    floor = math.sqrt(3) * 0.28210
-    local = reference(smooth, window, floor, "symmetric", valid)
     out, contrast = enhance_photograph(total, "bandpass", window, valid)
+    assert contrast.crossover is None
+    assert contrast.low_pass == pytest.approx(1.0, abs=1e-3)
+    weight = contrast.weight
+    assert 0.7 < weight < 0.8
+    passed = gaussian_mean(total.values, 1.0, 3, valid) - weight * gaussian_mean(total.values, 2.0, 6, valid)
+    # Of white noise is left the root of 1 / (4 pi s1^2) - 2 w / (2 pi (s1^2 + s2^2)) + w^2 / (4 pi s2^2).
+    gain = math.sqrt(1 / (4 * math.pi) - 2 * weight / (10 * math.pi) + weight**2 / (16 * math.pi))
+    local = reference(passed, window, math.sqrt(3) * gain, "symmetric", valid)
+    # Arctan of half of that: tan(a / 2) goes the way back.
+    expected = 127.5 + 127.5 * np.arctan(0.5 * np.tan(local * math.pi / 2)) / (math.pi / 2)
     defined = ~np.isnan(local)
     # A level of 16 bits is held in sixteen parts, and rounded: at the floor of 0.5 that is a few levels in a hundred.
-    assert np.abs(out - (127.5 + 127.5 * local))[defined].max() < 1.0
+    assert np.abs(out - expected)[defined].max() < 1.0
     assert (out[~defined] == 128).all()
-    assert contrast.floor == pytest.approx(floor, rel=1e-3)
+    assert contrast.floor == pytest.approx(math.sqrt(3) * gain, rel=5e-3)
 
 
-def test_low_pass_by_hand():
-    # One 1000 among zeros: at its place the Gaussian's largest weight, (1 / sum of exp(-k^2 / 2))^2 = (1 / 2.50661)^2 = 0.159157.
-    values = np.zeros((31, 31), np.uint16)
-    values[15, 15] = 1000
-    smooth, scale, gain = low_passed(values, 765)
-    assert smooth[15, 15] / scale == pytest.approx(159.157, abs=0.01)
-    assert smooth.sum() / scale == pytest.approx(1000.0, abs=0.1)
-    assert gain == pytest.approx(0.2821, abs=1e-4)  # 1 / (2 sqrt(pi))
-    assert (low_passed(np.full((20, 20), 765, np.uint16), 765)[0] == 765 * scale).all()
+def test_a_band_by_hand():
+    # One 1000 among zeros. The first Gaussian's largest weight is (1 / sum of exp(-k^2 / 2), |k| <= 3)^2 = (1 / 2.50596)^2, or
+    # 0.159241, the second's (1 / sum of exp(-k^2 / 8), |k| <= 6)^2 = (1 / 5.00812)^2 = 0.039870: 159.241 - 19.935 = 139.306.
+    values = np.zeros((41, 41), np.uint16)
+    values[20, 20] = 1000
+    passed, scale, gain = band_passed(values, 765, Band(1.0, 2.0, 0.5))
+    assert passed[20, 20] / scale == pytest.approx(139.306, abs=0.02)
+    assert passed.sum() / scale == pytest.approx(500.0, abs=0.1)
+    # 1 / (4 pi) - 1 / (10 pi) + 1 / (64 pi) = 0.079577 - 0.031831 + 0.004974 = 0.052720, and its root.
+    # Cut at three sigmas, the Gaussians let a little more through.
+    assert gain == pytest.approx(0.22961, abs=5e-4)
+    flat = band_passed(np.full((20, 20), 765, np.uint16), 765, Band(0.0, 2.0, 0.8))
+    assert flat[0] / scale == pytest.approx(np.full((20, 20), 153.0), abs=0.1)
+
+
+def test_the_band_follows_the_noise():
+    # exp(-2 pi^2 s^2 f^2) = 1 / 2 at f = 0.1874: s = sqrt(0.693147 / 19.7392) / 0.1874 = 1.0000.
+    one = band_of(0.1874)
+    assert one.fine == pytest.approx(1.0, abs=1e-4)
+    assert band_of(0.3748).fine == pytest.approx(0.5, abs=1e-4)
+    second = one.weight * math.exp(-8 * (math.pi * 0.1874) ** 2)
+    assert one.response(np.array([0.1874]))[0] == pytest.approx(0.5 - second, abs=1e-4)
+    assert band_of(0.7) == Band(0.0, 2.0, 0.8)  # strong texture is not blurred, and lifted as far as may be
+    assert band_of(0.05) == Band(1.5, 2.0, 0.0)  # where there is next to none, nothing is lifted
+    fine, weights = zip(*((b.fine, b.weight) for b in map(band_of, np.linspace(0.1, 0.8, 30))), strict=True)
+    assert (np.diff(fine) <= 0).all()
+    assert (np.diff(weights) >= -1e-6).all()
+    for f in (0.13, 0.15, 0.18):
+        assert texture_share(band_of(f), f) == pytest.approx(0.72, abs=1e-4)
 
 
 def micmac_reference(values, window, floor, valid=None):

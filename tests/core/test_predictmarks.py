@@ -52,7 +52,9 @@ def ground(name, local, sigma_h=1e-6, sigma_v=1e-6):
 
 
 def georef(covariance):
-    """Return a georeferencing that errs by a similarity's covariance (7, 7) and does not bend."""
+    """Return a georeferencing that errs by a similarity's covariance (7, 7), or () for an unknown one, and does not bend."""
+    if not len(covariance):
+        return Georef(frame(), "similarity", (), (0.0, 0.0, 0.0))
     wide = np.zeros((10, 10))
     wide[:7, :7] = covariance
     return Georef(frame(), "similarity", (), (0.0, 0.0, 0.0), tuple(np.ravel(wide).tolist()))
