@@ -1,8 +1,9 @@
-"""How one model errs against the other in height: level, tilts and scale, from stable ground and from both georeferencings.
+"""How one model errs against the other in height: level, tilts, scale and bending, from stable ground and both georeferencings.
 
-The error of the difference is modelled as a0 + aE (x - x0) + aN (y - y0) + aS (z - z0). The georeferencings give its prior
-covariance. Stable ground observes level and tilts by a robust plane, whose covariance follows from the variogram of what
-is left. Generalised least squares joins both (Tarantola 2005, chapter 3): where stable ground tells nothing the prior stands.
+The error of the difference is modelled by coefficients of 1, x, y, z, x^2, xy and y^2 about a centre (``terms``). The
+georeferencings give their prior covariance. Stable ground observes level and tilts by a robust plane, in which scale and bending
+show as far as they look like one there; its covariance follows from the variogram of what is left. Generalised least squares
+joins both (Tarantola 2005, chapter 3): where stable ground tells nothing the prior stands.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from ..progress import Progress
 from .coregistration import Shift, nmad, plane_design, robust_fit
 from .difference import Stable
 from .georeferencing import Georeferenced
+from .terms import COUNT, IN_METRES, height_terms
 from .uncertainty import SAMPLE, fit_covariance
 from .variogram import Variogram, fit_variogram
 from .zones import Zone
@@ -26,16 +28,18 @@ Array = NDArray[np.float64]
 _THIN = 0.02  # share of its length that stable ground must be wide to carry a tilt across
 _CHANCE = 0.001  # without georeferencings, a tilt is taken off when chance, which a fitted plane flatters, shows one more rarely
 _CONFLICT = 0.001  # stable ground and georeferencings contradict each other when chance would part them so more rarely
+_SURE = 1e-9  # share of the largest variance below which another is none
 _EXACT = 1e-12  # m2; noise is not less, so that models without any can be compared too
 _FREE = 2.0  # a tilt that may be this many times the level's sigma at a zone is one that stable ground does not know
 
 
 @dataclass(frozen=True)
 class HeightError:
-    """Expected error and covariance (p, p) about ``shift.centre``; p is 1 (level), 3 (plane) or 4 (with the scale of heights).
+    """Expected error and covariance (p, p) about ``shift.centre``; p is 1 (level), 3 (plane) or 7 (with scale and bending).
 
-    ``stable`` is the plane of stable ground with its covariance (3, 3), ``prior`` the georeferencings' covariance (4, 4).
-    ``covariance`` is None when it is not known. ``free`` says that a tilt is neither known nor in the covariance.
+    ``stable`` is the plane of stable ground with its covariance (3, 3), ``prior`` the georeferencings' covariance (7, 7).
+    ``covariance`` is None when it is not known. ``free`` says that a tilt is neither known nor in the covariance, ``bends`` that
+    both georeferencings know how far they may be bent.
     """
 
     shift: Shift
@@ -43,27 +47,31 @@ class HeightError:
     stable: tuple[Shift, Array] | None = None
     prior: Array | None = None
     free: bool = False
+    bends: bool = False
 
     def left_by(self, applied: Shift) -> tuple[float, ...]:
         """Return the coefficients (p,) of what is expected to remain when ``applied`` is taken off; none for its own shift."""
-        expected, centre = self.shift.coefficients, self.shift.centre
+        expected = np.array(self.shift.coefficients)
         if applied == self.shift or len(expected) == 1:
             return ()  # a level of stable ground is the median, which is what is taken off
-        x, y = np.array(centre[0]), np.array(centre[1])
-        done = [float(applied.at(x, y)), *applied.coefficients[1:]]
-        return tuple(e - d for e, d in zip(expected, done + [0.0] * (len(expected) - len(done)), strict=True))
+        left = expected - applied.about(self.shift.centre)[: len(expected)]
+        return tuple(left.tolist())
 
     def exceeded_by(self, applied: Shift) -> bool:
         """Tell whether ``applied`` leaves more in the difference than what is not known explains."""
         left = np.array(self.left_by(applied))
         if self.covariance is None or not len(left):
             return False
-        return bool(chdtrc(len(left), left @ np.linalg.pinv(self.covariance) @ left) < _CONFLICT)
+        units = IN_METRES[: len(left), : len(left)]
+        sizes, axes = np.linalg.eigh(units @ self.covariance @ units.T)
+        open_ = sizes > _SURE * sizes[-1]  # what no georeferencing knows of has no variance
+        squares = (axes.T @ units @ left)[open_] ** 2 / sizes[open_]
+        return bool(chdtrc(np.count_nonzero(open_), squares.sum()) < _CONFLICT)
 
 
 @dataclass(frozen=True)
 class _Observation:
-    """``values`` (r,) = ``design`` (r, 4) times the error's coefficients plus noise of ``covariance`` (r, r).
+    """``values`` (r,) = ``design`` (r, 7) times the error's coefficients plus noise of ``covariance`` (r, r).
 
     ``basis`` (3, r) makes level and tilts of the values; ``samples`` is the effective number of independent cells.
     """
@@ -78,7 +86,7 @@ class _Observation:
 def from_georeferencing(prior: Georeferenced, centre: tuple[float, ...]) -> HeightError:
     """Return what the tags alone tell: no expected error, and the sum of both covariances."""
     covariance = prior.covariance(centre)
-    return HeightError(Shift("combined", (0.0,) * 4, centre), covariance, prior=covariance)
+    return HeightError(Shift("combined", (0.0,) * COUNT, centre), covariance, prior=covariance, bends=prior.bends)
 
 
 def from_both(ground: Stable, prior: Georeferenced, steps: tuple[float, float], progress: Progress) -> HeightError:
@@ -99,7 +107,8 @@ def from_both(ground: Stable, prior: Georeferenced, steps: tuple[float, float], 
     # What the plane swallowed of the correlated noise shows in the residuals of the expected error.
     second = _observe(ground, centre, Shift("combined", tuple(mean.tolist()), centre), steps)
     mean, posterior = _joined(second, covariance)
-    return HeightError(Shift("combined", tuple(mean.tolist()), centre), posterior, _plane(second, centre), covariance)
+    shift = Shift("combined", tuple(mean.tolist()), centre)
+    return HeightError(shift, posterior, _plane(second, centre), covariance, bends=prior.bends)
 
 
 def from_stable(ground: Stable, level: Shift, zones: list[Zone], steps: tuple[float, float], progress: Progress) -> HeightError:
@@ -146,10 +155,10 @@ def from_plane(ground: Stable, plane: Shift, steps: tuple[float, float]) -> Heig
 
 
 def _joined(seen: _Observation, prior: Array) -> tuple[Array, Array]:
-    """Return the mean (4,) and covariance (4, 4) after the observation."""
+    """Return the mean (7,) and covariance (7, 7) after the observation."""
     spread = seen.design @ prior @ seen.design.T + seen.covariance
     gain = np.linalg.solve(spread, seen.design @ prior).T
-    rest = np.eye(4) - gain @ seen.design
+    rest = np.eye(COUNT) - gain @ seen.design
     # Joseph's form stays symmetric and positive.
     return gain @ seen.values, rest @ prior @ rest.T + gain @ seen.covariance @ gain.T
 
@@ -171,8 +180,7 @@ def _observe(ground: Stable, centre: tuple[float, ...], expected: Shift | None, 
     else:
         covariance = _covariance(ground, design @ basis, variogram)
         samples = _variance(ground, variogram) / covariance[0, 0]
-    lift = np.column_stack([design, ground.height - centre[2]])
-    alias = np.linalg.lstsq(design @ basis, lift, rcond=None)[0]
+    alias = np.linalg.lstsq(design @ basis, height_terms(ground.x, ground.y, ground.height, centre), rcond=None)[0]
     return _Observation(values, covariance, basis, np.asarray(alias), samples)
 
 

@@ -5,6 +5,7 @@ import pytest
 import shapely
 from strandline.core.change.coregistration import Shift, fit_shift, nmad, statistics
 from strandline.core.change.sampling import Sample
+from strandline.core.change.terms import Moments
 from strandline.core.change.significance import beyond_detection, coherent, coverage_factor
 from strandline.core.change.uncertainty import Fitted, correlated_variance, fit_covariance, total
 from strandline.core.change.variogram import correlation, fit_variogram
@@ -226,7 +227,7 @@ class TestCorrelation:
         x, y = (v.ravel() for v in np.meshgrid(np.arange(0.25, 15, 0.5), np.arange(0.25, 40, 0.5)))
         covariance = fit_covariance(np.ones((len(x), 1)), np.column_stack([x, y]), 0.0, ((0.03**2, 20.0),), len(x))
         assert np.sqrt(covariance[0, 0]) == pytest.approx(0.0145, abs=0.0002)
-        assert Fitted(covariance, (0.0, 0.0)).sigma(5.0, 5.0, 0.0, 0.0) == pytest.approx(0.0145, abs=0.0002)
+        assert Fitted(covariance, (0.0, 0.0)).sigma(Moments((5.0, 5.0, 0.0))) == pytest.approx(0.0145, abs=0.0002)
 
     def test_fitted_plane_covers_the_truth(self):
         """Least-squares planes on correlated fields: their extrapolation scatters as the covariance says."""
@@ -236,7 +237,7 @@ class TestCorrelation:
         design = np.column_stack([np.ones(len(x)), x - centre[0], y - centre[1]])
         pick = np.random.default_rng(0).permutation(len(x))[:1500]
         covariance = fit_covariance(design[pick], np.column_stack([x, y])[pick], 0.0, ((1.0, 12.0),), len(x))
-        predicted = Fitted(covariance, centre).sigma(100.0, 30.0, 0.0, 0.0)
+        predicted = Fitted(covariance, centre).sigma(Moments((100.0, 30.0, 0.0)))
         random = np.random.default_rng(1)
         g = np.array([1.0, 100.0 - centre[0], 30.0 - centre[1]])
         at = [g @ np.linalg.lstsq(design, correlated_field(random, 60, 12.0).ravel(), rcond=None)[0] for _ in range(300)]
