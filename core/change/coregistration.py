@@ -34,7 +34,7 @@ class Statistics:
 class Shift:
     """What is subtracted from the difference, a function of the place.
 
-    ``coefficients`` (1,), (3,) or (7,) are those of the first of 1, x, y, z, x^2, xy, y^2 about ``centre`` (x0, y0, z0), where z is
+    ``coefficients`` (1,), (3,) or (7,) are those of the first of 1, x, y, z, x^2, xy, y^2 about ``centre`` (x0, y0, z0); z is
     BEFORE's height. The method "combined" is what stable ground and both georeferencings tell together.
     """
 
@@ -74,7 +74,8 @@ class Shift:
         if len(slopes) > 2:
             text += f", {1e3 * slopes[2]:+.4f} mm per metre of height"
             east, north, between = (1e3 * (IN_METRES @ self.coefficients)[4:]).tolist()
-            text += f", bending {east:+.2f} mm at {BENT_AT:g} m to the east, {north:+.2f} mm to the north, {between:+.2f} mm to the north-east"
+            text += f", bending at {BENT_AT:g} m {east:+.2f} mm to the east, {north:+.2f} mm to the north"
+            text += f", {between:+.2f} mm to the north-east"
         return text
 
 

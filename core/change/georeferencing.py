@@ -111,10 +111,10 @@ def _damaged(label: str, why: object) -> InputError:
 
 
 def _height_covariance(block: _Block, crs: str, centre: tuple[float, ...]) -> Array:
-    """Return the covariance (7, 7) of the coefficients by which the block's error in height depends on the terms about ``centre``.
+    """Return the covariance (7, 7) of the coefficients of the terms about ``centre`` in the block's error in height.
 
     The error at a place is linear in the ten numbers and quadratic in the place, so a fit to places about ``centre`` is exact but
-    for the CRS's own bend against the frame (some 1e-7 of the numbers' effects).
+    for the CRS's own bend against the frame (some 1e-6 of the numbers' effects).
     """
     steps = np.array([(i, k, 0.0) for i in (-1, 0, 1) for k in (-1, 0, 1)] + [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
     places = np.asarray(centre) + _FAR * steps
@@ -125,5 +125,6 @@ def _height_covariance(block: _Block, crs: str, centre: tuple[float, ...]) -> Ar
     errors = np.column_stack([zero, zero, zero + 1.0, north, -east, zero, up, east * east, east * north, north * north])
     # Fitted in units of _FAR, so that the terms are alike in size.
     units = _FAR ** np.array([0, 1, 1, 1, 2, 2, 2])
-    fitted = np.linalg.lstsq(height_terms(*steps.T, (0.0, 0.0, 0.0)), errors, rcond=None)[0] / units[:, None]
+    terms = height_terms(steps[:, 0], steps[:, 1], steps[:, 2], (0.0, 0.0, 0.0))
+    fitted = np.linalg.lstsq(terms, errors, rcond=None)[0] / units[:, None]
     return np.asarray(fitted @ block.matrix @ fitted.T)

@@ -159,10 +159,10 @@ def _stable(report: Report, f: Findings) -> None:
     report.text(f"Taken off the difference: {f.shift.method}, {f.shift.describe()}.")
     if f.known is None or not f.known.bends:
         report.text(
-            "The systematic part knows of no dome, which self-calibrated cameras leave in a block (a centimetre or two at its edge is "
-            "common, and it differs from flight to flight): the two models do not both carry the georeferencing of an adjustment, "
-            "which tells how far they may be bent. Where zones lie far from STABLE, look at the map for change that rises with the "
-            "distance from the middle, and put stable ground on all sides."
+            "The systematic part knows of no dome, which self-calibrated cameras leave in a block (a centimetre or two at its "
+            "edge is common, and it differs from flight to flight): not both models carry the georeferencing of an adjustment, "
+            "which tells how far a block may be bent. Where zones lie far from STABLE, look at the map for change that rises with "
+            "the distance from the middle, and put stable ground on all sides."
         )
     if f.known is not None and f.known.covariance is not None:
         _known(report, f.known)
@@ -193,7 +193,7 @@ def _known(report: Report, known: HeightError) -> None:
     report.table(["error of AFTER against BEFORE", *names], rows)
     report.text(
         "What is taken as known joins both by generalised least squares; its covariance, and what was not taken off, make the "
-        "systematic part. A dash: not known, and not counted."
+        "systematic part. Bending rises as the square of the distance. A dash: not known, and not counted."
     )
 
 

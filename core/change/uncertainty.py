@@ -63,7 +63,7 @@ class Fitted:
     beside: float = 0.0
 
     def sigma(self, zone: Moments) -> float | None:
-        """Return sqrt(g' Cov g + (g' left)^2 + beside^2) with the mean terms g: exact for a sum over cells, as all is linear in g."""
+        """Return sqrt(g' Cov g + (g' left)^2 + beside^2) , g the mean terms: as the error is linear in them, that is exact."""
         g = zone.about(self.centre)[: len(self.covariance)]
         known = float(g @ self.left) if self.left else 0.0
         return float(np.sqrt(max(0.0, g @ self.covariance @ g) + known**2 + self.beside**2))

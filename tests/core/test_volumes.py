@@ -5,10 +5,11 @@ import pytest
 import shapely
 from strandline.core.change.coregistration import Shift, fit_shift, nmad, statistics
 from strandline.core.change.sampling import Sample
-from strandline.core.change.terms import Moments
 from strandline.core.change.significance import beyond_detection, coherent, coverage_factor
-from strandline.core.change.uncertainty import Fitted, correlated_variance, fit_covariance, total
+from strandline.core.change.terms import Moments
+from strandline.core.change.uncertainty import ErrorModel, Fitted, correlated_variance, fit_covariance, total
 from strandline.core.change.variogram import correlation, fit_variogram
+from strandline.core.change.volumes import Cells, Tally
 from strandline.core.change.zones import cell_shares, touched
 from strandline.core.errors import NotEnoughData
 from strandline.core.raster import Grid
@@ -115,6 +116,34 @@ class TestStableGround:
         with pytest.raises(NotEnoughData, match="larger stable areas"):
             fit_shift("vertical", line[:5], line[:5], line[:5])
         assert fit_shift("none", line, line, line) == Shift("none")
+
+
+class TestMeanTerms:
+    def test_systematic_sigma_is_that_of_the_sum_over_cells(self):
+        """Shares, holes and two tiles, far from the coordinates' origin: to 1e-9 of the plain sum."""
+        random = np.random.default_rng(5)
+        grid = Grid(300_000.0, 5_774_000.0, 0.5, 60, 40, "", 0.4)
+        change, before = random.normal(0, 0.1, (40, 60)), random.normal(5, 2, (40, 60))
+        change[10:14, 20:30] = np.nan
+        zone = shapely.Point(300_016.3, 5_773_991.1).buffer(6.7)
+        tally = Tally(zone.area)
+        every = np.zeros((40, 60))
+        for first, width in ((0, 35), (35, 25)):
+            window = grid.window(first, 0, width, 40)
+            part = np.s_[:, first : first + width]
+            row, column, shares = cell_shares(zone, window)
+            tally.add(Cells(window, first, 60, change[part], None, None, before[part]), row, column, shares)
+            every[part][row : row + shares.shape[0], column : column + shares.shape[1]] = shares
+        sizes = np.array([0.01, 1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6])
+        root = sizes[:, None] * random.standard_normal((7, 7))
+        fitted = Fitted(root @ root.T, (299_900.0, 5_774_200.0, 3.0), tuple((root @ np.ones(7)).tolist()))
+        rows, columns = np.nonzero((every > 0) & np.isfinite(change))
+        x, y = grid.centres(rows, columns)
+        dx, dy, dz = x - 299_900.0, y - 5_774_200.0, before[rows, columns] - 3.0
+        g = every[rows, columns] @ np.column_stack([np.ones(len(x)), dx, dy, dz, dx * dx, dx * dy, dy * dy])
+        expected = grid.cell_area * np.sqrt(g @ fitted.covariance @ g + (g @ fitted.left) ** 2)
+        volume = tally.volume(ErrorModel(None, None), fitted)
+        assert volume.sigma.systematic == pytest.approx(expected, rel=1e-9)
 
 
 class TestSample:
