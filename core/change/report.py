@@ -161,8 +161,8 @@ def _stable(report: Report, f: Findings) -> None:
         report.text(
             "The systematic part knows of no dome, which self-calibrated cameras leave in a block (a centimetre or two at its "
             "edge is common, and it differs from flight to flight): not both models carry the georeferencing of an adjustment, "
-            "which tells how far a block may be bent. Where zones lie far from STABLE, look at the map for change that rises with "
-            "the distance from the middle, and put stable ground on all sides."
+            "which tells how far a block may be bent. Where zones lie far from STABLE, look at the map for change that rises "
+            "with the distance from the middle, and put stable ground on all sides."
         )
     if f.known is not None and f.known.covariance is not None:
         _known(report, f.known)

@@ -66,7 +66,7 @@ class Fitted:
         """Return sqrt(g' Cov g + (g' left)^2 + beside^2) , g the mean terms: as the error is linear in them, that is exact."""
         g = zone.about(self.centre)[: len(self.covariance)]
         known = float(g @ self.left) if self.left else 0.0
-        return float(np.sqrt(max(0.0, g @ self.covariance @ g) + known**2 + self.beside**2))
+        return float(np.sqrt(max(0.0, float(g @ self.covariance @ g)) + known**2 + self.beside**2))
 
 
 def correlated_variance(sample: Array, count: int, squares: float, reach: float) -> float:
