@@ -188,6 +188,22 @@ def test_a_zone_sums_its_cells_errors(make_raster, make_polygons, tmp_path):
     assert "knows of no dome" in page.read_text(encoding="utf-8")
 
 
+def test_a_dome_without_noise_is_taken_off(make_raster, make_polygons, tmp_path):
+    """A strip that shows a dome as it is tells it everywhere: 1 cm at 40 m leaves less than a tenth of a millimetre."""
+    rows, columns = np.mgrid[0:80, 0:100]
+    values = 5 + 0.01 * rows
+    dome = 6.25e-6 * ((columns - 50.0) ** 2 + (rows - 40.0) ** 2)
+    told = tags(bent(0.02, 1e-3, 1e-4, 1e-5))
+    stable = make_polygons("stable", [shapely.box(80, -75, 100, -5)])
+    pair = make_raster("b", values, tags=told), make_raster("a", values + dome, tags=told)
+    result = run(Request(*pair, str(tmp_path / "o.tif"), stable=stable))
+    assert abs(result.net) / result.area < 1e-4
+    left = run(Request(*pair, str(tmp_path / "o.tif"), stable=stable, coregister="plane"))
+    # What the plane leaves is known, and counts.
+    assert left.net / left.area > 0.01
+    assert left.net_systematic == pytest.approx(left.net, rel=0.02)
+
+
 class TestCoverage:
     """Two blocks whose true errors are drawn from their ten numbers' covariances: a dome of 1.6 cm at 40 m is one sigma.
 
