@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NotEnoughData
+from .terms import BENT_AT, COUNT, IN_METRES, about_another
 
 Array = NDArray[np.float64]
 _HUBER, _BIWEIGHT = 1.345, 4.685  # 95 % efficiency on normal errors
@@ -31,10 +32,10 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Shift:
-    """What is subtracted from the difference, an affine function of the place.
+    """What is subtracted from the difference, a function of the place.
 
-    ``coefficients`` (1,), (3,) or (4,) are those of 1, x - x0, y - y0, BEFORE's height - z0 about ``centre`` (x0, y0, z0). The
-    method "combined" is what stable ground and both georeferencings tell together.
+    ``coefficients`` (1,), (3,) or (7,) are those of the first of 1, x, y, z, x^2, xy, y^2 about ``centre`` (x0, y0, z0); z is
+    BEFORE's height. The method "combined" is what stable ground and both georeferencings tell together.
     """
 
     method: Method
@@ -42,14 +43,25 @@ class Shift:
     centre: tuple[float, ...] = (0.0, 0.0)
 
     def at(self, x: Array, y: Array, height: Array | None = None) -> Array:
-        """Return the shift (m) at places of any matching shapes; ``height`` is needed by four coefficients."""
-        level, *slopes = self.coefficients
+        """Return the shift (m) at places of any matching shapes; ``height`` is needed by seven coefficients."""
+        level, *others = self.coefficients
         places = (x, y) if height is None else (x, y, height)
-        shape = np.broadcast_shapes(*(np.shape(v) for v in places))
-        # A centre is as long as the slopes, but for one that is not used; zip says so when a height is missing.
-        count = len(slopes)
-        terms = zip(slopes, places[:count], self.centre[:count], strict=True)
-        return level + sum((slope * (v - v0) for slope, v, v0 in terms), np.zeros(shape))
+        shift = np.full(np.broadcast_shapes(*(np.shape(v) for v in places)), level)
+        if others:
+            east, north = x - self.centre[0], y - self.centre[1]
+            shift += others[0] * east + others[1] * north
+        if len(others) > 2:
+            if height is None:
+                raise ValueError("a shift that depends on the height needs it")
+            xx, xy, yy = others[3:]
+            shift += others[2] * (height - self.centre[2]) + (xx * east + xy * north) * east + yy * north * north
+        return shift
+
+    def about(self, centre: tuple[float, ...]) -> Array:
+        """Return the coefficients (7,) of the same shift about another centre."""
+        own = np.zeros(COUNT)
+        own[: len(self.coefficients)] = self.coefficients
+        return np.asarray(own @ about_another(self.centre, centre))
 
     def describe(self) -> str:
         """Return it in words."""
@@ -59,8 +71,11 @@ class Shift:
         text = f"{level:+.4f} m"
         if slopes:
             text += f", tilt {1e3 * slopes[0]:+.4f} mm/m to the east, {1e3 * slopes[1]:+.4f} mm/m to the north"
-        if len(slopes) == 3:
+        if len(slopes) > 2:
             text += f", {1e3 * slopes[2]:+.4f} mm per metre of height"
+            east, north, between = (1e3 * (IN_METRES @ self.coefficients)[4:]).tolist()
+            text += f", bending at {BENT_AT:g} m {east:+.2f} mm to the east, {north:+.2f} mm to the north"
+            text += f", {between:+.2f} mm to the north-east"
         return text
 
 

@@ -1,8 +1,10 @@
-"""How one model errs against the other in height: level, tilts and scale, from stable ground and from both georeferencings.
+"""How one model errs against the other in height: level, tilts, scale and bending, from stable ground and both georeferencings.
 
-The error of the difference is modelled as a0 + aE (x - x0) + aN (y - y0) + aS (z - z0). The georeferencings give its prior
-covariance. Stable ground observes level and tilts by a robust plane, whose covariance follows from the variogram of what
-is left. Generalised least squares joins both (Tarantola 2005, chapter 3): where stable ground tells nothing the prior stands.
+The error of the difference is modelled by coefficients of 1, x, y, z, x^2, xy and y^2 about a centre (``terms``). The
+georeferencings give their prior covariance. Stable ground observes level and tilts, and bending where the georeferencings know of
+it, by a robust fit, in which the rest shows as far as it looks like these there; the fit's covariance follows from the variogram
+of what is left. Generalised least squares joins both (Tarantola 2005, chapter 3): where stable ground tells nothing the prior
+stands.
 """
 
 from __future__ import annotations
@@ -15,9 +17,10 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc
 
 from ..progress import Progress
-from .coregistration import Shift, nmad, plane_design, robust_fit
+from .coregistration import Shift, nmad, robust_fit
 from .difference import Stable
 from .georeferencing import Georeferenced
+from .terms import COUNT, IN_METRES, height_terms
 from .uncertainty import SAMPLE, fit_covariance
 from .variogram import Variogram, fit_variogram
 from .zones import Zone
@@ -26,16 +29,18 @@ Array = NDArray[np.float64]
 _THIN = 0.02  # share of its length that stable ground must be wide to carry a tilt across
 _CHANCE = 0.001  # without georeferencings, a tilt is taken off when chance, which a fitted plane flatters, shows one more rarely
 _CONFLICT = 0.001  # stable ground and georeferencings contradict each other when chance would part them so more rarely
+_SURE = 1e-9  # share of the largest variance below which another is none
 _EXACT = 1e-12  # m2; noise is not less, so that models without any can be compared too
 _FREE = 2.0  # a tilt that may be this many times the level's sigma at a zone is one that stable ground does not know
 
 
 @dataclass(frozen=True)
 class HeightError:
-    """Expected error and covariance (p, p) about ``shift.centre``; p is 1 (level), 3 (plane) or 4 (with the scale of heights).
+    """Expected error and covariance (p, p) about ``shift.centre``; p is 1 (level), 3 (plane) or 7 (with scale and bending).
 
-    ``stable`` is the plane of stable ground with its covariance (3, 3), ``prior`` the georeferencings' covariance (4, 4).
-    ``covariance`` is None when it is not known. ``free`` says that a tilt is neither known nor in the covariance.
+    ``stable`` is the plane of stable ground with its covariance (3, 3), ``prior`` the georeferencings' covariance (7, 7).
+    ``covariance`` is None when it is not known. ``free`` says that a tilt is neither known nor in the covariance, ``bends`` that
+    both georeferencings know how far they may be bent.
     """
 
     shift: Shift
@@ -43,48 +48,54 @@ class HeightError:
     stable: tuple[Shift, Array] | None = None
     prior: Array | None = None
     free: bool = False
+    bends: bool = False
 
     def left_by(self, applied: Shift) -> tuple[float, ...]:
         """Return the coefficients (p,) of what is expected to remain when ``applied`` is taken off; none for its own shift."""
-        expected, centre = self.shift.coefficients, self.shift.centre
+        expected = np.array(self.shift.coefficients)
         if applied == self.shift or len(expected) == 1:
             return ()  # a level of stable ground is the median, which is what is taken off
-        x, y = np.array(centre[0]), np.array(centre[1])
-        done = [float(applied.at(x, y)), *applied.coefficients[1:]]
-        return tuple(e - d for e, d in zip(expected, done + [0.0] * (len(expected) - len(done)), strict=True))
+        left = expected - applied.about(self.shift.centre)[: len(expected)]
+        return tuple(left.tolist())
 
     def exceeded_by(self, applied: Shift) -> bool:
         """Tell whether ``applied`` leaves more in the difference than what is not known explains."""
         left = np.array(self.left_by(applied))
         if self.covariance is None or not len(left):
             return False
-        return bool(chdtrc(len(left), left @ np.linalg.pinv(self.covariance) @ left) < _CONFLICT)
+        units = IN_METRES[: len(left), : len(left)]
+        sizes, axes = np.linalg.eigh(units @ self.covariance @ units.T)
+        open_ = sizes > _SURE * sizes[-1]  # what no georeferencing knows of has no variance
+        squares = (axes.T @ units @ left)[open_] ** 2 / sizes[open_]
+        return bool(chdtrc(np.count_nonzero(open_), squares.sum()) < _CONFLICT)
 
 
 @dataclass(frozen=True)
 class _Observation:
-    """``values`` (r,) = ``design`` (r, 4) times the error's coefficients plus noise of ``covariance`` (r, r).
+    """``values`` (r,) = ``design`` (r, 7) times the error's coefficients plus noise of ``covariance`` (r, r).
 
-    ``basis`` (3, r) makes level and tilts of the values; ``samples`` is the effective number of independent cells.
+    ``basis`` (7, r) makes coefficients of the values: level, ``tilts`` in number, then bending beside these. ``samples`` is the
+    effective number of independent cells.
     """
 
     values: Array
     covariance: Array
     basis: Array
     design: Array
+    tilts: int
     samples: float
 
 
 def from_georeferencing(prior: Georeferenced, centre: tuple[float, ...]) -> HeightError:
     """Return what the tags alone tell: no expected error, and the sum of both covariances."""
     covariance = prior.covariance(centre)
-    return HeightError(Shift("combined", (0.0,) * 4, centre), covariance, prior=covariance)
+    return HeightError(Shift("combined", (0.0,) * COUNT, centre), covariance, prior=covariance, bends=prior.bends)
 
 
 def from_both(ground: Stable, prior: Georeferenced, steps: tuple[float, float], progress: Progress) -> HeightError:
     """Return the generalised least squares of stable ground and both georeferencings."""
     centre = _centre(ground)
-    first = _observe(ground, centre, None, steps)
+    first = _observe(ground, centre, None, steps, prior.bends)
     covariance = prior.covariance(centre)
     spread = first.design @ covariance @ first.design.T + first.covariance
     misfit = float(first.values @ np.linalg.solve(spread, first.values))
@@ -96,10 +107,11 @@ def from_both(ground: Stable, prior: Georeferenced, steps: tuple[float, float], 
             "sigmas are enlarged by that; check that STABLE has not moved, and the control points."
         )
     mean, _ = _joined(first, covariance)
-    # What the plane swallowed of the correlated noise shows in the residuals of the expected error.
-    second = _observe(ground, centre, Shift("combined", tuple(mean.tolist()), centre), steps)
+    # What the fit swallowed of the correlated noise shows in the residuals of the expected error.
+    second = _observe(ground, centre, Shift("combined", tuple(mean.tolist()), centre), steps, prior.bends)
     mean, posterior = _joined(second, covariance)
-    return HeightError(Shift("combined", tuple(mean.tolist()), centre), posterior, _plane(second, centre), covariance)
+    shift = Shift("combined", tuple(mean.tolist()), centre)
+    return HeightError(shift, posterior, _plane(second, centre), covariance, bends=prior.bends)
 
 
 def from_stable(ground: Stable, level: Shift, zones: list[Zone], steps: tuple[float, float], progress: Progress) -> HeightError:
@@ -110,7 +122,7 @@ def from_stable(ground: Stable, level: Shift, zones: list[Zone], steps: tuple[fl
     """
     centre = _centre(ground)
     seen = _observe(ground, centre, None, steps)
-    tilts = len(seen.values) - 1
+    tilts = seen.tilts
     left = seen.samples - 1.0 - tilts
     if tilts and left > 0:
         ratio = float(seen.values[1:] @ np.linalg.solve(seen.covariance[1:, 1:], seen.values[1:])) / tilts
@@ -139,64 +151,77 @@ def from_stable(ground: Stable, level: Shift, zones: list[Zone], steps: tuple[fl
 def from_plane(ground: Stable, plane: Shift, steps: tuple[float, float]) -> HeightError:
     """Return the ``plane`` fitted to stable ground as what is expected, whether its tilt is significant or not."""
     seen = _observe(ground, _centre(ground), None, steps)
-    if len(seen.values) < 3:
+    if seen.tilts < 2:
         return HeightError(plane, None)
     covariance = _plane(seen, plane.centre)[1]
     return HeightError(plane, covariance, (plane, covariance))
 
 
 def _joined(seen: _Observation, prior: Array) -> tuple[Array, Array]:
-    """Return the mean (4,) and covariance (4, 4) after the observation."""
+    """Return the mean (7,) and covariance (7, 7) after the observation."""
     spread = seen.design @ prior @ seen.design.T + seen.covariance
     gain = np.linalg.solve(spread, seen.design @ prior).T
-    rest = np.eye(4) - gain @ seen.design
+    rest = np.eye(COUNT) - gain @ seen.design
     # Joseph's form stays symmetric and positive.
     return gain @ seen.values, rest @ prior @ rest.T + gain @ seen.covariance @ gain.T
 
 
-def _observe(ground: Stable, centre: tuple[float, ...], expected: Shift | None, steps: tuple[float, float]) -> _Observation:
-    """Fit a plane as far as stable ground carries one; noise is what it leaves, or what the ``expected`` error leaves."""
-    design = plane_design(ground.x, ground.y, centre)
-    basis = _basis(design, min(steps))
-    values = robust_fit(design @ basis, ground.change)
-    level, east, north = (basis @ values).tolist()
-    residual = Shift("plane", (level, east, north), centre) if expected is None else expected
+def _observe(
+    ground: Stable, centre: tuple[float, ...], expected: Shift | None, steps: tuple[float, float], bends: bool = False
+) -> _Observation:
+    """Fit as much as stable ground carries; noise is what that leaves, or what the ``expected`` error leaves."""
+    terms = height_terms(ground.x, ground.y, ground.height, centre)
+    basis, tilts = _basis(terms, min(steps), bends)
+    values = robust_fit(terms @ basis, ground.change)
+    residual = Shift("combined", tuple((basis @ values).tolist()), centre) if expected is None else expected
     variogram = _variogram(ground, residual, steps)
     if variogram is None:
         # Too few cells to tell noise from what they share: they count as one, and carry no tilt.
-        basis, values = basis[:, :1], np.array([float(np.median(ground.change))])
+        basis, tilts, values = basis[:, :1], 0, np.array([float(np.median(ground.change))])
         noise = nmad(ground.change) ** 2
         variogram = Variogram(0.0, ((max(noise, _EXACT), np.inf),))
         covariance, samples = np.array([[variogram.sill]]), 1.0
     else:
-        covariance = _covariance(ground, design @ basis, variogram)
+        covariance = _covariance(ground, terms @ basis, variogram)
         samples = _variance(ground, variogram) / covariance[0, 0]
-    lift = np.column_stack([design, ground.height - centre[2]])
-    alias = np.linalg.lstsq(design @ basis, lift, rcond=None)[0]
-    return _Observation(values, covariance, basis, np.asarray(alias), samples)
+    alias = np.linalg.lstsq(terms @ basis, terms, rcond=None)[0]
+    return _Observation(values, covariance, basis, np.asarray(alias), tilts, samples)
 
 
-def _basis(design: Array, step: float) -> Array:
-    """Return level and the tilts (3, r) along the principal axes of stable ground, the longer first, that it can carry."""
-    lengths, axes = np.linalg.eigh(design[:, 1:].T @ design[:, 1:] / len(design))
+def _basis(terms: Array, step: float, bends: bool) -> tuple[Array, int]:
+    """Return what stable ground can carry (7, r), and how many tilts are among it.
+
+    Level and the tilts along its principal axes, the longer first; where it ``bends`` also what of x^2, xy and y^2 is not like a
+    plane there, by principal components, the larger first.
+    """
+    lengths, axes = np.linalg.eigh(terms[:, 1:3].T @ terms[:, 1:3] / len(terms))
     extent = np.sqrt(np.maximum(lengths, 0.0))
     kept = [i for i in (1, 0) if extent[i] > max(step, _THIN * extent[1])]
-    basis = np.zeros((3, 1 + len(kept)))
-    basis[0, 0] = 1.0
-    basis[1:, 1:] = axes[:, kept]
-    return basis
+    flat = np.zeros((COUNT, 1 + len(kept)))
+    flat[0, 0] = 1.0
+    flat[1:3, 1:] = axes[:, kept]
+    if not bends or not kept:
+        return flat, len(kept)
+    bent = np.eye(COUNT)[:, 4:]
+    bent = bent - flat @ np.linalg.lstsq(terms @ flat, terms @ bent, rcond=None)[0]
+    lengths, axes = np.linalg.eigh(bent.T @ terms.T @ terms @ bent / len(terms))
+    size = np.sqrt(np.maximum(lengths, 0.0))
+    some = [i for i in (2, 1, 0) if size[i] > max(step * step, _THIN * size[2])]
+    return np.hstack([flat, bent @ axes[:, some]]), len(kept)
 
 
 def _plane(seen: _Observation, centre: tuple[float, ...]) -> tuple[Shift, Array]:
-    level, east, north = (seen.basis @ seen.values).tolist()
-    return Shift("plane", (level, east, north), centre[:2]), np.asarray(seen.basis @ seen.covariance @ seen.basis.T)
+    count = 1 + seen.tilts
+    basis = seen.basis[:3, :count]
+    level, east, north = (basis @ seen.values[:count]).tolist()
+    return Shift("plane", (level, east, north), centre[:2]), np.asarray(basis @ seen.covariance[:count, :count] @ basis.T)
 
 
 def _unseen(seen: _Observation, centre: tuple[float, ...], zones: list[Zone]) -> str | None:
     """Return in which direction a tilt that stable ground cannot tell would matter at a zone, None when in none."""
     offsets = shapely.get_coordinates(shapely.centroid([zone.shape for zone in zones])) - centre[:2]
     known = dict(enumerate(np.sqrt(np.diag(seen.covariance))[1:].tolist()))
-    axes = seen.basis[1:, 1:].T
+    axes = seen.basis[1:3, 1:].T
     if len(axes) == 1:
         axes = np.vstack([axes, [-axes[0, 1], axes[0, 0]]])
     elif len(axes) == 0:

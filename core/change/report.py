@@ -17,6 +17,7 @@ from .difference import Outcome
 from .heighterror import HeightError
 from .heights import Heights
 from .significance import coverage_factor
+from .terms import BENT_AT, COUNT, IN_METRES
 from .uncertainty import ErrorModel
 from .variogram import Variogram
 from .volumes import Parts, Volume
@@ -156,11 +157,13 @@ def _volumes(report: Report, f: Findings) -> None:
 def _stable(report: Report, f: Findings) -> None:
     report.heading("Co-registration and stable ground")
     report.text(f"Taken off the difference: {f.shift.method}, {f.shift.describe()}.")
-    report.text(
-        "The systematic part knows of level, tilt and scale. It does not know of a dome, which self-calibrated cameras leave in "
-        "a block (a centimetre or two at its edge is common, and it differs from flight to flight): where zones lie far from "
-        "STABLE, look at the map for change that rises with the distance from the middle, and put stable ground on all sides."
-    )
+    if f.known is None or not f.known.bends:
+        report.text(
+            "The systematic part knows of no dome, which self-calibrated cameras leave in a block (a centimetre or two at its "
+            "edge is common, and it differs from flight to flight): not both models carry the georeferencing of an adjustment, "
+            "which tells how far a block may be bent. Where zones lie far from STABLE, look at the map for change that rises "
+            "with the distance from the middle, and put stable ground on all sides."
+        )
     if f.known is not None and f.known.covariance is not None:
         _known(report, f.known)
     if f.stable is None:
@@ -180,25 +183,30 @@ def _stable(report: Report, f: Findings) -> None:
 def _known(report: Report, known: HeightError) -> None:
     rows: list[list[object]] = []
     if known.prior is not None:
-        rows.append(["the georeferencings (expected, sigma)", *_pairs((0.0,) * 4, known.prior)])
+        rows.append(["the georeferencings (expected, sigma)", *_pairs((0.0,) * COUNT, known.prior)])
     if known.stable is not None:
         rows.append(["stable ground (fitted, sigma)", *_pairs(known.stable[0].coefficients, known.stable[1])])
     if known.covariance is not None:
         rows.append(["taken as known (expected, sigma)", *_pairs(known.shift.coefficients, known.covariance)])
-    names = ("level (mm)", "tilt to the east (mm/m)", "tilt to the north (mm/m)", "height's scale (mm/m)")
+    bent = [f"bending at {BENT_AT:g} m to the {where} (mm)" for where in ("east", "north", "north-east")]
+    names = ("level (mm)", "tilt to the east (mm/m)", "tilt to the north (mm/m)", "height's scale (mm/m)", *bent)
     report.table(["error of AFTER against BEFORE", *names], rows)
     report.text(
         "What is taken as known joins both by generalised least squares; its covariance, and what was not taken off, make the "
-        "systematic part. A dash: not known, and not counted."
+        "systematic part. Bending rises as the square of the distance. A dash: not known, and not counted."
     )
 
 
 def _pairs(values: tuple[float, ...], covariance: Array) -> list[str | None]:
-    """Return four texts "value +- sigma" in mm; a sigma of 0 is that of a tilt which nothing observes."""
+    """Return seven texts "value +- sigma" in mm; a sigma of 0 is that of what nothing observes."""
+    count = len(values)
+    units = 1e3 * IN_METRES[:count, :count]
+    units[1:4] /= BENT_AT  # per metre
     told: list[str | None] = [
-        f"{1e3 * value:+.3g} +- {1e3 * sigma:.2g}" for value, sigma in zip(values, np.sqrt(np.diag(covariance)), strict=True)
+        f"{value:+.3g} +- {sigma:.2g}"
+        for value, sigma in zip(units @ values, np.sqrt(np.diag(units @ covariance @ units.T)), strict=True)
     ]
-    return told + [None] * (4 - len(told))
+    return told + [None] * (COUNT - count)
 
 
 def _map(f: Findings, light: NDArray[np.float32]) -> Any:

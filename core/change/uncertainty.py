@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .terms import Moments
 from .variogram import pair_sum
 
 Array = NDArray[np.float64]
@@ -33,8 +34,8 @@ class ErrorModel:
 class Systematic(Protocol):
     """An error common to all cells."""
 
-    def sigma(self, x: float, y: float, before: float, after: float) -> float | None:
-        """Return the sigma (m) of the mean change of a zone with its covered cells' mean place and heights; None: not known."""
+    def sigma(self, zone: Moments) -> float | None:
+        """Return the sigma (m) of the mean change of a zone with its covered cells' mean terms; None: not known."""
 
 
 @dataclass(frozen=True)
@@ -43,14 +44,14 @@ class Given:
 
     value: float | None
 
-    def sigma(self, x: float, y: float, before: float, after: float) -> float | None:
+    def sigma(self, zone: Moments) -> float | None:
         """Return it."""
         return self.value
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """What is not known of a level, plane or combined surface about ``centre``: covariance (p, p), p 1, 3 or 4 as in ``Shift``.
+    """What is not known of a level, plane or combined surface about ``centre``: covariance (p, p), p 1, 3 or 7 as in ``Shift``.
 
     ``left`` (p,) is what is known to remain in the difference because another correction was asked for; ``beside`` (m) is an
     error of all cells that the covariance does not hold.
@@ -61,11 +62,11 @@ class Fitted:
     left: tuple[float, ...] = ()
     beside: float = 0.0
 
-    def sigma(self, x: float, y: float, before: float, after: float) -> float | None:
-        """Return sqrt(g' Cov g + (g' left)^2 + beside^2) with g = 1, x - x0, y - y0, height before - z0."""
-        g = np.array([1.0, *(np.array([x, y, before])[: len(self.centre)] - self.centre)])[: len(self.covariance)]
+    def sigma(self, zone: Moments) -> float | None:
+        """Return sqrt(g' Cov g + (g' left)^2 + beside^2) , g the mean terms: as the error is linear in them, that is exact."""
+        g = zone.about(self.centre)[: len(self.covariance)]
         known = float(g @ self.left) if self.left else 0.0
-        return float(np.sqrt(max(0.0, g @ self.covariance @ g) + known**2 + self.beside**2))
+        return float(np.sqrt(max(0.0, float(g @ self.covariance @ g)) + known**2 + self.beside**2))
 
 
 def correlated_variance(sample: Array, count: int, squares: float, reach: float) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..raster import Grid
 from .sampling import Sample, mixed
+from .terms import COUNT, Moments, about_another
 from .uncertainty import SAMPLE, ErrorModel, Systematic, correlated_variance, total
 
 Array = NDArray[np.float64]
@@ -102,7 +103,10 @@ class Tally:
         self._net, self._down, self._up = _Sum(), _Sum(), _Sum()
         self._significant_down = self._significant_up = 0.0
         self._noise = 0.0
-        self._place = np.zeros(3)  # share-weighted sums of x, y, height before
+        self._origin: tuple[float, ...] | None = (
+            None  # the first cell that was met: near the zone, so that squares keep their digits
+        )
+        self._terms = np.zeros(COUNT)  # share-weighted sums of the height's terms about it
         self._detected = True
         self._cell_area = 0.0
 
@@ -116,13 +120,17 @@ class Tally:
         kept = np.zeros(change.shape, np.bool_) if tile.significant is None else tile.significant[part]
         groups = (self._net, self._down, self._up)
         limits = np.array([group.sample.limit for group in groups], np.uint64)
-        sums, others = np.zeros((3, 6)), np.zeros(7)
+        sums, others = np.zeros((3, 6)), np.zeros(10)
         picked = np.zeros(change.shape, np.uint8)
         first = tile.first + row * tile.stride + column
         _gather(change, sigma, kept, before, shares, first, tile.stride, limits, sums, others, picked)
-        x0, y0 = (float(v) for v in grid.centres(np.array(row), np.array(column)))
-        weight, by_column, by_row, height, down, up, noise = others.tolist()
-        self._place += (weight * x0 + by_column * grid.cell, weight * y0 - by_row * grid.step_north, height)
+        corner = (*(float(v) for v in grid.centres(np.array(row), np.array(column))), 0.0)
+        self._origin = self._origin or corner
+        # Columns run east, rows south.
+        east, south = grid.cell, -grid.step_north
+        terms = others[:COUNT] * (1.0, east, south, 1.0, east * east, east * south, south * south)
+        self._terms += about_another(self._origin, corner) @ terms
+        down, up, noise = others[COUNT:].tolist()
         self._significant_down += down
         self._significant_up += up
         self._noise += _HALF_NORMAL * noise
@@ -156,8 +164,8 @@ class Tally:
         if weight == 0.0:
             unknown = Parts(None, None, None)
             return Volume(None, unknown, None, unknown, None, unknown, None, None, None, self._area, 0.0)
-        x, y, before = self._place / weight
-        shift_sigma = systematic.sigma(float(x), float(y), float(before), float(before + self._net.height / weight))
+        assert self._origin is not None
+        shift_sigma = systematic.sigma(Moments(self._origin, tuple((self._terms / weight).tolist())))
         fill, detected = self._fill(), self._detected
         return Volume(
             net=a * self._net.height,
@@ -204,7 +212,8 @@ def _gather(
 
     Sums: height, weight, squares and count of cells with a sigma, weight of those without one, weighted sigmas.
 
-    ``others``: weight, weight by column and by row, height before, significant fall and rise, sigma of what is not significant.
+    ``others``: weight times 1, column, row, height before, column^2, column row, row^2; then significant fall and rise, sigma of
+    what is not significant.
     """
     for r in range(change.shape[0]):
         for c in range(change.shape[1]):
@@ -232,8 +241,11 @@ def _gather(
             others[1] += w * c
             others[2] += w * r
             others[3] += w * before[r, c]
+            others[4] += w * c * c
+            others[5] += w * c * r
+            others[6] += w * r * r
             if kept[r, c]:
-                others[4] += w * max(-dh, 0.0)
-                others[5] += w * max(dh, 0.0)
+                others[7] += w * max(-dh, 0.0)
+                others[8] += w * max(dh, 0.0)
             elif known:
-                others[6] += s
+                others[9] += s

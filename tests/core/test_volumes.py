@@ -6,8 +6,10 @@ import shapely
 from strandline.core.change.coregistration import Shift, fit_shift, nmad, statistics
 from strandline.core.change.sampling import Sample
 from strandline.core.change.significance import beyond_detection, coherent, coverage_factor
-from strandline.core.change.uncertainty import Fitted, correlated_variance, fit_covariance, total
+from strandline.core.change.terms import Moments
+from strandline.core.change.uncertainty import ErrorModel, Fitted, correlated_variance, fit_covariance, total
 from strandline.core.change.variogram import correlation, fit_variogram
+from strandline.core.change.volumes import Cells, Tally
 from strandline.core.change.zones import cell_shares, touched
 from strandline.core.errors import NotEnoughData
 from strandline.core.raster import Grid
@@ -114,6 +116,34 @@ class TestStableGround:
         with pytest.raises(NotEnoughData, match="larger stable areas"):
             fit_shift("vertical", line[:5], line[:5], line[:5])
         assert fit_shift("none", line, line, line) == Shift("none")
+
+
+class TestMeanTerms:
+    def test_systematic_sigma_is_that_of_the_sum_over_cells(self):
+        """Shares, holes and two tiles, far from the coordinates' origin: to 1e-9 of the plain sum."""
+        random = np.random.default_rng(5)
+        grid = Grid(300_000.0, 5_774_000.0, 0.5, 60, 40, "", 0.4)
+        change, before = random.normal(0, 0.1, (40, 60)), random.normal(5, 2, (40, 60))
+        change[10:14, 20:30] = np.nan
+        zone = shapely.Point(300_016.3, 5_773_991.1).buffer(6.7)
+        tally = Tally(zone.area)
+        every = np.zeros((40, 60))
+        for first, width in ((0, 35), (35, 25)):
+            window = grid.window(first, 0, width, 40)
+            part = np.s_[:, first : first + width]
+            row, column, shares = cell_shares(zone, window)
+            tally.add(Cells(window, first, 60, change[part], None, None, before[part]), row, column, shares)
+            every[part][row : row + shares.shape[0], column : column + shares.shape[1]] = shares
+        sizes = np.array([0.01, 1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6])
+        root = sizes[:, None] * random.standard_normal((7, 7))
+        fitted = Fitted(root @ root.T, (299_900.0, 5_774_200.0, 3.0), tuple((root @ np.ones(7)).tolist()))
+        rows, columns = np.nonzero((every > 0) & np.isfinite(change))
+        x, y = grid.centres(rows, columns)
+        dx, dy, dz = x - 299_900.0, y - 5_774_200.0, before[rows, columns] - 3.0
+        g = every[rows, columns] @ np.column_stack([np.ones(len(x)), dx, dy, dz, dx * dx, dx * dy, dy * dy])
+        expected = grid.cell_area * np.sqrt(g @ fitted.covariance @ g + (g @ fitted.left) ** 2)
+        volume = tally.volume(ErrorModel(None, None), fitted)
+        assert volume.sigma.systematic == pytest.approx(expected, rel=1e-9)
 
 
 class TestSample:
@@ -226,7 +256,7 @@ class TestCorrelation:
         x, y = (v.ravel() for v in np.meshgrid(np.arange(0.25, 15, 0.5), np.arange(0.25, 40, 0.5)))
         covariance = fit_covariance(np.ones((len(x), 1)), np.column_stack([x, y]), 0.0, ((0.03**2, 20.0),), len(x))
         assert np.sqrt(covariance[0, 0]) == pytest.approx(0.0145, abs=0.0002)
-        assert Fitted(covariance, (0.0, 0.0)).sigma(5.0, 5.0, 0.0, 0.0) == pytest.approx(0.0145, abs=0.0002)
+        assert Fitted(covariance, (0.0, 0.0)).sigma(Moments((5.0, 5.0, 0.0))) == pytest.approx(0.0145, abs=0.0002)
 
     def test_fitted_plane_covers_the_truth(self):
         """Least-squares planes on correlated fields: their extrapolation scatters as the covariance says."""
@@ -236,7 +266,7 @@ class TestCorrelation:
         design = np.column_stack([np.ones(len(x)), x - centre[0], y - centre[1]])
         pick = np.random.default_rng(0).permutation(len(x))[:1500]
         covariance = fit_covariance(design[pick], np.column_stack([x, y])[pick], 0.0, ((1.0, 12.0),), len(x))
-        predicted = Fitted(covariance, centre).sigma(100.0, 30.0, 0.0, 0.0)
+        predicted = Fitted(covariance, centre).sigma(Moments((100.0, 30.0, 0.0)))
         random = np.random.default_rng(1)
         g = np.array([1.0, 100.0 - centre[0], 30.0 - centre[1]])
         at = [g @ np.linalg.lstsq(design, correlated_field(random, 60, 12.0).ravel(), rcond=None)[0] for _ in range(300)]
