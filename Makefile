@@ -33,6 +33,7 @@ bench: setup ## speed and memory, beside a peer in the same run
 	@OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(ENGINE)/python tests/benchmarks/bench_features.py
 	@OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(ENGINE)/python tests/benchmarks/bench_matching.py
 	@$(ENGINE)/python tests/benchmarks/bench_enhance.py
+	@OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(ENGINE)/python tests/benchmarks/bench_georeference.py
 
 strings: ## collect the words to translate into i18n/*.ts
 	$(QGIS_PYTHON) scripts/strings.py

@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..frames import horizontal, transformer
 from ..survey import Photograph
 from ..vector import Layer, read_layer
-from .marks import Mark, key_of, listed, marks_of_table, match_marks, match_names
+from .marks import Mark, key_of, listed, marks_of_table, match_marks, match_names, predictions_among
 
 Array = NDArray[np.float64]
 
@@ -102,8 +102,10 @@ def given_from_layers(
     coordinates = _coordinates(layer, names, height_field)
     columns = [layer.numbers(f) if f else np.full(len(layer), np.nan) for f in (sigma_h_field, sigma_v_field)]
     roles = tuple(layer.text(role_field)) if role_field else ()
-    seen = tuple(marks_of_table(read_layer(marks))) if marks else ()
-    return Given(layer.name, layer.crs, tuple(names), coordinates, roles, np.stack(columns, axis=1), seen)
+    table = read_layer(marks) if marks else None
+    seen = tuple(marks_of_table(table)) if table is not None else ()
+    notes = tuple(predictions_among(table)) if table is not None else ()
+    return Given(layer.name, layer.crs, tuple(names), coordinates, roles, np.stack(columns, axis=1), seen, notes=notes)
 
 
 def control_from(

@@ -45,6 +45,19 @@ def marks_of_table(table: Layer) -> Iterable[Mark]:
         yield Mark(gcp, image, float(x[i]), float(y[i]))
 
 
+def predictions_among(table: Layer) -> list[str]:
+    """Return a note when marks are predictions of ``predictmarks`` that nothing measured: those repeat what they came from."""
+    if "score" not in {name.casefold() for name in table.fields}:
+        return []
+    count = int(np.isnan(table.numbers("score")).sum())
+    if not count:
+        return []
+    return [
+        f"{count} of {len(table)} marks of {table.name} have no score: if nobody corrected these predictions they only confirm the "
+        "georeferencing that they came from; correct them, or predict with REFINE."
+    ]
+
+
 def match_photograph(image: str, photographs: Sequence[Photograph]) -> str | None:
     """Return the name of the photograph that ``image`` means, None for none.
 

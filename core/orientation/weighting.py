@@ -24,7 +24,7 @@ _ROUNDS = 60
 _BOWL = 100.0
 _FEW = 6  # tests from which a group's own scatter is told
 _SETTLED = 1.15  # times the factor of a variance, or less: it stands
-_YIELD = 1.08  # by which that grows each round, so that groups that share an error do not hand it to and fro for ever
+_YIELD = 1.08  # by which that grows each round, so that groups that share an error settle, too
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ def drawn(seeds: range) -> None:
     row("RTK alone, gimballed over flat sand", replace(scene, control=0, checks=17, tilt=0.5, relief=0.3), seeds)
     true = interior.calibrated(lens(*scene.size, scene.focal), lens(*scene.size, scene.focal), np.eye(8) * 1e-12)
     row(
-        "  the same, calibration re-used", replace(scene, control=0, checks=17, tilt=0.5, relief=0.3), seeds,
+        "  the same, calibration of another survey", replace(scene, control=0, checks=17, tilt=0.5, relief=0.3), seeds,
         lambda flight: flight.adjusted(true),
     )  # fmt: skip
     row("a mark off by 30 px", replace(scene, wrong_mark=30.0), seeds)

@@ -7,9 +7,9 @@ from pyproj import Transformer
 from strandline.core.contract import VectorSource
 from strandline.core.errors import InputError
 from strandline.core.orientation.control import Given, control_from, given_from_layers, in_metres
-from strandline.core.orientation.marks import Mark, match_names, match_photograph
+from strandline.core.orientation.marks import Mark, match_names, match_photograph, predictions_among
 from strandline.core.survey import Photograph
-from strandline.core.vector import write_layer
+from strandline.core.vector import Layer, write_layer
 
 UTM = "EPSG:32631"
 PHOTOS = [Photograph(n, 1, "x", 4000, 3000, "c") for n in ("DJI_0001.JPG", "DJI_0002.JPG", "east/IMG_1.CR2", "west/IMG_1.CR2")]
@@ -260,3 +260,14 @@ def test_degrees_with_heights_in_metres_are_moved():
     degrees = np.column_stack([*to_degrees.transform(PLACES[:, 0], PLACES[:, 1]), PLACES[:, 2]])
     assert in_metres(given(crs="EPSG:4326", coordinates=degrees), UTM) == pytest.approx(PLACES, abs=1e-4)
     assert in_metres(given(crs="EPSG:4979", coordinates=degrees), UTM) == pytest.approx(PLACES, abs=1e-4)
+
+
+def test_predictions_that_nobody_measured_are_told():
+    def table(score):
+        fields = {n: np.array(v, object) for n, v in {"gcp": ["A", "B"], "image": ["a", "b"], "Score": score}.items()}
+        return Layer("marks", np.arange(2), fields, None, None)
+
+    (note,) = predictions_among(table([0.9, None]))
+    assert "1 of 2 marks of marks have no score" in note
+    assert predictions_among(table([0.9, 0.8])) == []
+    assert predictions_among(Layer("marks", np.arange(2), {"gcp": np.array(["A", "B"], object)}, None, None)) == []
