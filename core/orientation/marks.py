@@ -53,8 +53,8 @@ def predictions_among(table: Layer) -> list[str]:
     if not count:
         return []
     return [
-        f"{count} of {len(table)} marks of {table.name} have no score: if nobody corrected these predictions they only confirm the "
-        "georeferencing that they came from; correct them, or predict with REFINE."
+        f"{count} of {len(table)} marks of {table.name} have no score: if nobody corrected these predictions they only confirm "
+        "the georeferencing that they came from; correct them, or predict with REFINE."
     ]
 
 
