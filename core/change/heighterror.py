@@ -169,11 +169,13 @@ def _joined(seen: _Observation, prior: Array) -> tuple[Array, Array]:
 def _observe(
     ground: Stable, centre: tuple[float, ...], expected: Shift | None, steps: tuple[float, float], bends: bool = False
 ) -> _Observation:
-    """Fit as much as stable ground carries; noise is what that leaves, or what the ``expected`` error leaves."""
+    """Fit as much as stable ground carries; noise is what level and tilts of it leave, or what the ``expected`` error leaves."""
     terms = height_terms(ground.x, ground.y, ground.height, centre)
     basis, tilts = _basis(terms, min(steps), bends)
     values = robust_fit(terms @ basis, ground.change)
-    residual = Shift("combined", tuple((basis @ values).tolist()), centre) if expected is None else expected
+    # Fitted bending would swallow correlated noise as well, and then be believed.
+    flat = basis[:, : 1 + tilts] @ values[: 1 + tilts]
+    residual = Shift("combined", tuple(flat.tolist()), centre) if expected is None else expected
     variogram = _variogram(ground, residual, steps)
     if variogram is None:
         # Too few cells to tell noise from what they share: they count as one, and carry no tilt.
