@@ -332,7 +332,7 @@ def test_a_full_disk_is_one_sentence_and_costs_no_earlier_result(whole, step, ch
         ("enhance", {"survey": "/nowhere"}, "/nowhere is not a survey folder"),
         ("georeference", {"gcps": ("gcps.gpkg", "EPSG:32755")}, "km from the GNSS positions"),
         ("georeference", {"gcps": ("gcps.gpkg", "EPSG:2229")}, "US survey foot"),
-        ("georeference", {"marks": ("unknown.csv", None)}, "the marks name IMG_0001.jpg"),
+        ("georeference", {"marks": ("unknown.csv", None)}, "in IMG_0001.jpg"),
         ("georeference", {"output_html_file": "/proc/page.html"}, "The report /proc/page.html cannot be written"),
         ("exportdsm", {"area": ("away.gpkg", None)}, "AREA lies outside"),
         ("exportdsm", {"resolution": 1e-300}, "RESOLUTION=1e-300"),
