@@ -24,9 +24,10 @@ _UNKNOWN_FOCAL = 0.1  # relative, when the files do not tell
 # Of small cameras with fixed lenses, wide of what is seen: radial terms of a tenth, decentring terms of a thousandth.
 _DISTORTION = {"k1": 0.3, "k2": 0.3, "p1": 0.005, "p2": 0.005, "k3": 0.3, "k4": 0.3, "k5": 0.3, "k6": 0.3}
 # What a lens keeps from flight to flight. A calibration without a covariance is off by more: by CALIBRATION_SIGMA.
-_KEPT_FOCAL = 0.001  # relative: some ten degrees of temperature
-_KEPT_CENTRE = 0.001  # of the longer side
-_KEPT = {"k1": 0.003, "k2": 0.006, "p1": 2e-4, "p2": 2e-4, "k3": 0.006, "k4": 0.006, "k5": 0.006, "k6": 0.006}
+_KEPT_FOCAL = 0.0007  # relative: some ten degrees of temperature
+_KEPT_CENTRE = 0.0005  # of the longer side
+# Some tenths of a pixel at the edge of the photograph.
+_KEPT = {"k1": 5e-4, "k2": 1e-3, "p1": 5e-5, "p2": 5e-5, "k3": 1e-3, "k4": 1e-3, "k5": 1e-3, "k6": 1e-3}
 
 # Beyond these a parameter is told of.
 _RESTS = 0.7  # posterior over prior sigma
