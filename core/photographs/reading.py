@@ -61,7 +61,7 @@ class ChannelSum:
     ``values`` (rows, columns) are uint16 for 8-bit photographs and uint32 for 16-bit and RAW ones; ``white`` is the
     largest value that can occur: ``channels * 255`` or ``channels * 65535``. ``step`` is what one digital number (DN) of
     the file is in ``values``: 1, and for RAW what its levels were scaled by. ``linear`` tells that the values are proportional to
-    light (RAW), not gamma-coded. ``means`` (strips, 8, n, channels) are ``block_means`` of strips of the colours, in the unit of
+    light (RAW), not gamma-coded. ``means`` (strips, 16, n, channels) are ``block_means`` of strips of the colours, in the unit of
     ``values``; empty where nobody asked for them. The sum keeps what an 8-bit luma rounds away: up to log2(3) = 1.6 bits where
     the three channels see one grey signal, as on sand.
     """
