@@ -128,9 +128,9 @@ def fixed(seeds: range) -> None:
         print(f"calibration held, {label}: dome of {100 * np.mean(rises):+.1f} cm told in {alarms} of {len(seeds)} runs")
 
 
-def large(photographs: int = 500) -> None:
-    """Print time and memory of a block of 500 photographs."""
-    scene = Scene(length=500.0, width=330.0, points=1500, control=9, checks=9)
+def large() -> None:
+    """Print time and memory of a large block."""
+    scene = Scene(length=250.0, width=250.0, points=1500, control=9, checks=9)
     flight = flown(scene)
     started = time.perf_counter()
     solution = flight.adjusted(compare=True)
