@@ -1,6 +1,8 @@
 # What one does in a clone. `make` alone tells.
 
 ENGINE := .engine/bin
+# As the engine starts itself: on several threads BLAS sums in another order from run to run.
+ENGINE_ENV := OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 QGIS_PYTHON := /usr/bin/python3
 # QGIS without a window, with a profile of its own and the plugin under its right name.
 QGIS_ENV := QT_QPA_PLATFORM=offscreen QGIS_CUSTOM_CONFIG_PATH="$(CURDIR)/.build/profile" QGIS_PLUGINPATH="$(CURDIR)/.build/plugins"
@@ -18,7 +20,7 @@ demo: setup ## from simulated photographs to volumes, through QGIS; the results 
 	$(QGIS_ENV) $(ENGINE)/python scripts/demo.py
 
 test: setup ## all tests: the engine's, then those that go through QGIS
-	$(ENGINE)/python -m pytest tests/core
+	$(ENGINE_ENV) $(ENGINE)/python -m pytest tests/core
 	$(QGIS_ENV) timeout 1200 $(QGIS_PYTHON) -m pytest -W "ignore:Unknown config option" tests/qgis
 
 lint: setup ## style, types and spelling
