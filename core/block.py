@@ -46,3 +46,11 @@ class Block:
     rays: NDArray[np.int32]
     observed_point: NDArray[np.int32]
     observed_view: NDArray[np.int32]
+
+    def only(self, kept: NDArray[np.bool_]) -> Block:
+        """Return the block with some of its points (n,)."""
+        if kept.all():
+            return self
+        seen = kept[self.observed_point]
+        number = (np.cumsum(kept) - 1).astype(np.int32)[self.observed_point[seen]]
+        return Block(self.views, self.points[kept], self.errors[kept], self.rays[kept], number, self.observed_view[seen])

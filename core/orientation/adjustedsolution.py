@@ -10,7 +10,7 @@ from scipy import stats
 
 from ..block import Block
 from ..frames import LocalFrame
-from .adjustment import Adjusted, Control, Positions, Sighting
+from .adjustment import Adjusted, Control, Positions
 from .alternatives import alternatives
 from .assembly import Assembly, adjusted_block, network_of
 from .blunders import Blunder
@@ -21,6 +21,7 @@ from .interior import Interior, told
 from .marks import listed
 from .observations import Seen
 from .reliability import Test, without
+from .sightings import Sighting
 from .solution import AdjustedCamera, Solution, WrongMark
 from .weighting import FALSE_ALARM, Weighted, settle
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..errors import NotEnoughData
 from . import bundle
@@ -21,6 +20,8 @@ from .bundle import POSE, Cameras, Rays
 from .gnss import offsets
 from .independence import design_effect
 from .interior import Interior
+from .normals import inverse, solve
+from .sightings import Sighting, meet, rows
 
 Array = NDArray[np.float64]
 
@@ -28,23 +29,10 @@ _ROUNDS = 40
 _WEIGHING = 6  # rounds after which the tie points' weights and sigma stand, so that the rest can settle
 _STILL = 1e-6  # m, and px at the image's edge: a change below which the adjustment stands
 _HUBER = 2.5  # sigmas of a tie point's 2D residual, or of a position's, beyond which it weighs less (Huber 1964)
-_SINGULAR = 2e-14  # of the largest eigenvalue: below, it is rounding
-_LOOSE = 10.0  # m
-_WITH = 0.2  # of the largest motion: what moves with it
 _HALVINGS = 8  # of a step that overshoots
 _GAIN = 1e-6  # of the sum of squares in sigmas: below, no unknown moves by more than a thousandth of its own
 _NOISE = 1e-10  # of the cost: what rounding may add
 _LEAST_SIGMA = 1e-4  # px; keeps exact observations solvable
-
-
-@dataclass(frozen=True)
-class Sighting:
-    """The marks of a ground point: ``view`` (m,), pixels ``xy`` (m, 2) and their sigma (m,) per axis."""
-
-    name: str
-    view: NDArray[np.int64]
-    xy: Array
-    sigma: Array
 
 
 @dataclass(frozen=True)
@@ -175,7 +163,7 @@ def adjust(
     cost, weighed = _cost(state, control, positions, weights), 0
     for _ in range(_ROUNDS):
         system = _system(state, control, positions, weights)
-        change = _solve(system.matrix, system.side, len(network.cameras.centre))
+        change = solve(system.matrix, system.side, len(network.cameras.centre))
         for _ in range(_HALVINGS):
             tried = _moved(state, control, weights, change)
             trial = _cost(tried, control, positions, weights)
@@ -197,8 +185,8 @@ def adjust(
             "The adjustment does not settle: tie points, ground points and positions contradict each other; look at the "
             "residuals of METHOD=similarity."
         )
-    inverse = _inverse(_system(state, control, positions, weights).matrix, len(network.cameras.centre))
-    return Adjusted(state.network, tuple(control), positions, state.places, state.bias, sigma, effect, weights.tie, inverse)
+    whole = inverse(_system(state, control, positions, weights).matrix, len(network.cameras.centre))
+    return Adjusted(state.network, tuple(control), positions, state.places, state.bias, sigma, effect, weights.tie, whole)
 
 
 @dataclass(frozen=True)
@@ -319,55 +307,6 @@ def _antennas(cameras: Cameras, positions: Positions) -> Array:
     return np.asarray(centres + offsets(turns, positions.lever))
 
 
-def rows(cameras: Cameras, sighting: Sighting, point: Array, size: int) -> tuple[Array, Array, Array]:
-    """Return the derivatives of marks by the unknowns (2m, size) and the point (2m, 3), and residuals (2m,) observed - computed.
-
-    Residuals are NaN where the point cannot be seen.
-    """
-    count = len(sighting.view)
-    jacobian, by_point, left = np.zeros((2 * count, size)), np.zeros((2 * count, 3)), np.full(2 * count, np.nan)
-    at, one_point, one_pose, one_brown = np.empty(2), np.empty((2, 3)), np.empty((2, 6)), np.empty((2, 12))
-    first = cameras.interior_column
-    for i, (view, xy) in enumerate(zip(sighting.view, sighting.xy, strict=True)):
-        c = cameras.camera[view]
-        pose = cameras.rotation[view], cameras.centre[view]
-        if not bundle.project(point, *pose, cameras.brown[c], at, one_point, one_pose, one_brown):
-            continue
-        part = slice(2 * i, 2 * i + 2)
-        free = cameras.free[c]
-        left[part], by_point[part] = xy - at, one_point
-        jacobian[part, POSE * view : POSE * view + POSE] = one_pose
-        jacobian[part, first[c] : first[c] + free] = one_brown @ cameras.basis[c, :, :free]
-    return jacobian, by_point, left
-
-
-def meet(cameras: Cameras, sighting: Sighting) -> Array:
-    """Return where the marks of a sighting meet (3,), weighted by their sigmas; NaN where they do not."""
-    start = np.array([0, len(sighting.view)], np.int64)
-    first = _straight(cameras, sighting)
-    if not np.isfinite(first).all():
-        return first
-    points, residuals = bundle.intersect(
-        start, sighting.view, sighting.xy, 1.0 / sighting.sigma**2, first[None], cameras.rotation, cameras.centre, cameras.camera,
-        cameras.brown, cameras.basis, cameras.free, 10,
-    )  # fmt: skip
-    return np.asarray(points[0] if np.isfinite(residuals).all() else np.full(3, np.nan))
-
-
-def _straight(cameras: Cameras, sighting: Sighting) -> Array:
-    """Return the point (3,) nearest to the rays of a sighting, weighted, distortion left out; NaN when they are parallel."""
-    brown = cameras.brown[cameras.camera[sighting.view]]
-    x = (sighting.xy - brown[:, 2:4]) / brown[:, :2]
-    inside = np.column_stack([x, np.ones(len(x))])
-    rays = np.einsum("nji,nj->ni", cameras.rotation[sighting.view], inside)
-    rays /= np.linalg.norm(rays, axis=1)[:, None]
-    across = (np.eye(3) - rays[:, :, None] * rays[:, None, :]) / sighting.sigma[:, None, None] ** 2
-    system = across.sum(axis=0)
-    if np.linalg.cond(system) > 1e12:
-        return np.full(3, np.nan)
-    return np.asarray(np.linalg.solve(system, np.einsum("nij,nj->i", across, cameras.centre[sighting.view])))
-
-
 def _tie_residuals(network: Network) -> Array:
     """Return observed minus computed (m, 2) of the tie points' rays, NaN where a point cannot be seen."""
     c, t = network.cameras, network.ties
@@ -434,59 +373,3 @@ def _size(network: Network, change: Array) -> float:
     poses = change[: POSE * len(network.cameras.centre)].reshape(-1, POSE)
     focal = float(network.cameras.brown[:, 0].max())
     return float(max(np.abs(poses[:, 3:]).max(), focal * np.abs(poses[:, :3]).max()))
-
-
-def _solve(matrix: Array, side: Array, views: int) -> Array:
-    scale = _scale(matrix)
-    factor = _factor(matrix * scale * scale[:, None], scale, views)
-    return np.asarray(scale * cho_solve(factor, scale * side))
-
-
-def _inverse(matrix: Array, views: int) -> Array:
-    scale = _scale(matrix)
-    factor = _factor(matrix * scale * scale[:, None], scale, views)
-    inverse = cho_solve(factor, np.eye(len(matrix)), overwrite_b=True, check_finite=False)
-    inverse = (inverse + inverse.T) / 2
-    return np.asarray(inverse * scale * scale[:, None])
-
-
-def _factor(scaled: Array, scale: Array, views: int) -> tuple[Array, bool]:
-    """Return Cholesky's factor; where a part of the block hangs loose, it is held where it is to ``_LOOSE`` metres.
-
-    Photographs that only one other ties to the rest, along a straight strip, slide on rays: nothing tells their scale. That
-    much is said by their sigma. What moves most of the block at once is no such part, and refused.
-
-    Raises
-    ------
-    NotEnoughData
-        When the block as a whole is not determined.
-    """
-    try:
-        return cho_factor(scaled, check_finite=False)
-    except LinAlgError:
-        pass
-    values, vectors = np.linalg.eigh(scaled)
-    held = scaled
-    for vector in vectors[:, values < _SINGULAR * values[-1]].T:
-        moves = np.abs((vector * scale)[: POSE * views].reshape(views, POSE)[:, 3:]).max(axis=1)
-        if np.mean(moves > _WITH * moves.max()) > 0.5:
-            raise _undetermined()
-        held = held + np.outer(vector, vector) * (moves.max() / _LOOSE) ** 2
-    try:
-        return cho_factor(held, check_finite=False)
-    except LinAlgError as error:
-        raise _undetermined() from error
-
-
-def _scale(matrix: Array) -> Array:
-    diagonal = np.diag(matrix)
-    if not np.all(diagonal > 0):
-        raise _undetermined()
-    return np.asarray(1.0 / np.sqrt(diagonal))
-
-
-def _undetermined() -> NotEnoughData:
-    return NotEnoughData(
-        "Tie points, ground points and positions do not determine the block: some photographs hang on too few of them; give more "
-        "control points, or GNSS positions."
-    )

@@ -43,7 +43,7 @@ def add(page: Report, solution: Solution) -> None:
             ["projection centres, median sigma in plan (m)", float(np.median(plan))],
             ["  in height (m)", float(np.median(solution.centre_sigma[:, 2]))],
         ]
-    rows.append(["of this in heights beyond shift, tilt, scale and bending (m)", solution.common.rest])
+    rows.append(["common height error beyond shift, tilt, scale and bending (m, RMS)", solution.common.rest])
     page.table(["", "value"], rows)
     page.text(
         "Sigmas come from the covariance of the whole adjustment: none holds other unknowns fixed. Tie points are an even "

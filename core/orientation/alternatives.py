@@ -12,9 +12,10 @@ from ..block import Block
 from ..errors import NotEnoughData
 from ..frames import LocalFrame
 from .accuracy import alti, plani
-from .adjustment import Adjusted, Sighting, adjust
+from .adjustment import Adjusted, adjust
 from .gnss import SHARED, Gnss
 from .observations import Seen, Solver, undetermined
+from .sightings import Sighting
 from .solution import Alternative, Solution
 from .weighting import Weighted
 

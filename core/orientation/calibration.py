@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..block import View
 from ..camera import Camera
 from ..errors import InputError
 from ..georef import FOLDER, Georef
 from ..survey import Photograph, Survey
+from .interior import Interior, calibrated, file_focal, free, held
 from .sparse import read_block
 
 MODEL = "model"  # the folder of a survey's sparse model in its free frame
@@ -61,3 +63,25 @@ def read_calibration(folder: str, photographs: Sequence[Photograph]) -> Mapping[
             "choose a survey flown with the same camera and focal length."
         )
     return {p.name: known[p.camera, p.width, p.height] for p in photographs}
+
+
+def interiors_of(
+    survey: Survey, cameras: Mapping[int, Camera], views: Mapping[int, View]
+) -> tuple[dict[int, Interior], dict[int, str]]:
+    """Return what is known of each camera (by id) before the adjustment, as the orientation knew it, and the cameras' labels."""
+    photographs = {p.name: p for p in survey.photographs}
+    standing = survey.require("orient").parameters
+    use, other = standing.get("calibration_use"), standing.get("calibration")
+    # Held cameras stand in the model as they are; only a prior needs the other survey again.
+    known = read_calibration(other, survey.photographs) if other and use == "prior" else {}
+    interiors, labels = {}, {}
+    for key, camera in cameras.items():
+        photo = photographs[views[key].name]
+        labels[key] = f"camera {photo.camera}" if photo.camera else f"camera {key}"
+        if use == "fixed":
+            interiors[key] = held()
+        elif photo.name in known:
+            interiors[key] = calibrated(camera, known[photo.name].camera, known[photo.name].covariance)
+        else:
+            interiors[key] = free(camera, file_focal(photo.focal))
+    return interiors, labels

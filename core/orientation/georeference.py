@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -11,8 +11,7 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from ..block import Block, View
-from ..camera import Camera
+from ..block import Block
 from ..contract import VectorSource, encode
 from ..errors import InputError, NotEnoughData
 from ..files import digest, whole
@@ -21,11 +20,11 @@ from ..georef import FOLDER, CalibratedCamera, Georef
 from ..progress import SILENT, Progress
 from ..survey import Survey, held
 from ..vector import check_destination
-from . import georeport, interior
+from . import georeport
 from .accuracy import Doming, alti, plani
 from .adjustedsolution import solve_adjustment
 from .assembly import assemble, write_back
-from .calibration import read_calibration
+from .calibration import interiors_of
 from .domes import dome_of
 from .findings import findings, verdict
 from .ignoring import outside
@@ -125,7 +124,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         if request.method == "adjustment":
             solution = _adjusted(request, survey, model, block, inputs, solution, usable, progress.part(0.4, 0.75))
         else:
-            solution = replace(solution, block=keep_points(solution.block, usable), kept=usable)
+            solution = replace(solution, block=solution.block.only(usable), kept=usable)
         result, dome = _result(request, solution, inputs)
         georef = _georef(solution, inputs, result)
         told = findings(solution, inputs, dome)
@@ -221,7 +220,7 @@ def _adjusted(
 ) -> Solution:
     """Return the adjustment from the similarity ``start``; points that it puts into IGNORE leave it, and it is done again."""
     assembly = assemble(model, block)
-    interiors, labels = _interiors(survey, assembly.cameras_by_id(), dict(zip(assembly.camera_ids, block.views, strict=True)))
+    interiors, labels = interiors_of(survey, assembly.cameras_by_id(), dict(zip(assembly.camera_ids, block.views, strict=True)))
     rounds = 0
 
     def step() -> None:
@@ -249,44 +248,6 @@ def _adjusted(
     again = usable.copy()
     again[first.kept] &= outside(first, inputs.ignore)
     return solved(again, True)
-
-
-def _interiors(
-    survey: Survey, cameras: Mapping[int, Camera], views: Mapping[int, View]
-) -> tuple[dict[int, interior.Interior], dict[int, str]]:
-    """Return what is known of each camera (by id) before the adjustment, as the orientation knew it, and the cameras' labels."""
-    photographs = {p.name: p for p in survey.photographs}
-    standing = survey.require("orient").parameters
-    use, other = standing.get("calibration_use"), standing.get("calibration")
-    # Held cameras stand in the model as they are; only a prior needs the other survey again.
-    known = read_calibration(other, survey.photographs) if other and use == "prior" else {}
-    interiors, labels = {}, {}
-    for key, camera in cameras.items():
-        photo = photographs[views[key].name]
-        labels[key] = f"camera {photo.camera}" if photo.camera else f"camera {key}"
-        if use == "fixed":
-            interiors[key] = interior.held()
-        elif photo.name in known:
-            interiors[key] = interior.calibrated(camera, known[photo.name].camera, known[photo.name].covariance)
-        else:
-            interiors[key] = interior.free(camera, interior.file_focal(photo.focal))
-    return interiors, labels
-
-
-def keep_points(block: Block, kept: NDArray[np.bool_]) -> Block:
-    """Return the block with some of its points (n,) only."""
-    if kept.all():
-        return block
-    seen = kept[block.observed_point]
-    number = (np.cumsum(kept) - 1).astype(np.int32)
-    return Block(
-        block.views,
-        block.points[kept],
-        block.errors[kept],
-        block.rays[kept],
-        number[block.observed_point[seen]],
-        block.observed_view[seen],
-    )
 
 
 def _enough(seen: Sequence[Seen], inputs: Inputs) -> None:

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from .adjustment import Adjusted, Control, rows
+from .adjustment import Adjusted, Control
 from .bundle import POSE
+from .sightings import rows
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,12 @@ from blocks import FRAME, Scene, flown
 from strandline.core.camera import Camera
 from strandline.core.errors import NotEnoughData
 from strandline.core.orientation import interior
-from strandline.core.orientation.adjustment import Control, Network, Positions, Sighting, adjust
+from strandline.core.orientation.adjustment import Control, Network, Positions, adjust
 from strandline.core.orientation.bundle import Cameras
 from strandline.core.orientation.common import bending_design, of_adjustment
 from strandline.core.orientation.reliability import tests as observation_tests
 from strandline.core.orientation.reliability import without
+from strandline.core.orientation.sightings import Sighting
 from strandline.core.simulation.flight import lens
 
 SMALL = Scene(length=30.0, width=30.0, height=40.0, size=(1200, 900), focal=1100.0, points=200, checks=10)
