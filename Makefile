@@ -8,7 +8,7 @@ QGIS_PYTHON := /usr/bin/python3
 QGIS_ENV := QT_QPA_PLATFORM=offscreen QGIS_CUSTOM_CONFIG_PATH="$(CURDIR)/.build/profile" QGIS_PLUGINPATH="$(CURDIR)/.build/plugins"
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint bench strings models package
+.PHONY: help setup demo test floor everyqgis lint bench strings models package
 
 help: ## show this
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1|\2/' | column -t -s '|'
@@ -21,7 +21,13 @@ demo: setup ## from simulated photographs to volumes, through QGIS; the results 
 
 test: setup ## all tests: the engine's, then those that go through QGIS
 	$(ENGINE_ENV) $(ENGINE)/python -m pytest tests/core
+	@$(MAKE) --no-print-directory floor
+
+floor: setup ## the tests that go through QGIS
 	$(QGIS_ENV) timeout 1200 $(QGIS_PYTHON) -m pytest -W "ignore:Unknown config option" tests/qgis
+
+everyqgis: ## the same on QGIS 3.22, 3.40 and 3.44, each in a Debian of its own (root)
+	@scripts/everyqgis
 
 lint: setup ## style, types and spelling
 	$(ENGINE)/ruff check .

@@ -95,3 +95,41 @@ def test_the_entry_can_tell_an_old_python_what_it_needs():
 def test_no_pickle_crosses_a_survey():
     strays = [str(p) for p in files("core") for module, _ in imports(p) if module.split(".")[0] in ("pickle", "joblib", "dill")]
     assert not strays
+
+
+def unready_for_qt6(text):
+    """Yield (line, what) for what Qt 6 has no more: enumerators named without their enumeration, ``exec_``, resources of pyrcc.
+
+    QVariant is spared: QGIS gives its types back on Qt 6, and QGIS 3.22 knows no others for its fields.
+    """
+    tree = ast.parse(text)
+    scopes = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Attribute):
+            continue
+        if node.attr in ("exec_", "print_", "qInitResources"):
+            yield node.lineno, node.attr
+        owner = node.value.id if isinstance(node.value, ast.Name) else ""
+        bare = id(node) not in scopes and id(node) not in called
+        if owner.startswith("Q") and owner != "QVariant" and node.attr[:1].isupper() and bare:
+            yield node.lineno, f"{owner}.{node.attr}"
+
+
+def test_the_qgis_side_is_ready_for_qt6():
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line} {what}"
+        for path in [ROOT / "__init__.py", *files(*MAY_IMPORT)]
+        for line, what in unready_for_qt6(path.read_text(encoding="utf-8"))
+    ]
+    assert not wrong
+
+
+def test_what_is_not_ready_for_qt6_is_seen():
+    def seen(text):
+        return [what for _, what in unready_for_qt6(text)]
+
+    assert seen("a = Qt.AlignLeft") == ["Qt.AlignLeft"]
+    assert seen("dialog.exec_()") == ["exec_"]
+    assert seen("x(QgsProcessing.TypeRaster | 1)") == ["QgsProcessing.TypeRaster"]
+    assert seen("a = Qt.AlignmentFlag.AlignLeft; QVariant.Int; QgsWkbTypes.Type.Point; Qt.Key(3)") == []
