@@ -10,15 +10,16 @@ from scipy import stats
 
 from ..block import Block
 from ..frames import LocalFrame
-from .adjustment import Adjusted, Control, Positions
+from .adjusted import Adjusted
 from .alternatives import alternatives
 from .assembly import Assembly, adjusted_block, network_of
 from .blunders import Blunder
-from .bundle import POSE
+from .cameras import POSE
 from .common import of_adjustment
 from .gnss import SHARED, Gnss, offsets
 from .interior import Interior, told
 from .marks import listed
+from .network import Control, Positions
 from .observations import Seen
 from .reliability import Test, without
 from .sightings import Sighting

@@ -12,7 +12,8 @@ from ..block import Block
 from ..errors import NotEnoughData
 from ..frames import LocalFrame
 from .accuracy import alti, plani
-from .adjustment import Adjusted, adjust
+from .adjusted import Adjusted
+from .adjustment import adjust
 from .gnss import SHARED, Gnss
 from .observations import Seen, Solver, undetermined
 from .sightings import Sighting

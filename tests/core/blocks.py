@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 from strandline.core.block import Block, View
 from strandline.core.camera import Camera
 from strandline.core.frames import LocalFrame
-from strandline.core.orientation import bundle, interior
+from strandline.core.orientation import interior
 from strandline.core.orientation.adjustedsolution import solve_adjustment
-from strandline.core.orientation.adjustment import Network, Positions, adjust
+from strandline.core.orientation.adjustment import adjust
 from strandline.core.orientation.assembly import Assembly
+from strandline.core.orientation.cameras import Cameras, Rays
 from strandline.core.orientation.control import GroundPoint
 from strandline.core.orientation.gnss import Gnss
 from strandline.core.orientation.marks import Mark
+from strandline.core.orientation.network import Network, Positions
 from strandline.core.orientation.observations import Seen, find_marks
 from strandline.core.orientation.solution import Solution, solve
 from strandline.core.simulation.flight import fly, lens, plan
@@ -115,7 +117,7 @@ def flown(scene: Scene, *, calibration: Camera | None = None) -> Flown:
 def oriented(
     views: tuple[View, ...],
     ground: Array,
-    rays: bundle.Rays,
+    rays: Rays,
     scene: Scene,
     random: np.random.Generator,
     calibration: Camera | None = None,
@@ -125,7 +127,7 @@ def oriented(
     camera = calibration or Camera("OPENCV", *scene.size, (about, about, scene.size[0] / 2, scene.size[1] / 2, 0, 0, 0, 0))
     known = interior.held() if calibration else interior.free(camera, interior.file_focal(about))
     basis, free = interior.merged({1: known})
-    cameras = bundle.Cameras(
+    cameras = Cameras(
         np.array([v.rotation for v in views]), np.array([v.centre for v in views]), np.zeros(len(views), np.int64),
         camera.brown()[None], basis, free,
     )  # fmt: skip
@@ -165,7 +167,7 @@ def _ground(beach: Beach, scene: Scene, photographs: int, random: np.random.Gene
     return np.column_stack([places, _height(beach, scene, np.clip(places, 0, [scene.length, scene.width]))])
 
 
-def _observe(views: tuple[View, ...], ground: Array, scene: Scene, random: np.random.Generator) -> bundle.Rays:
+def _observe(views: tuple[View, ...], ground: Array, scene: Scene, random: np.random.Generator) -> Rays:
     width, height = scene.size
     points, view_of, xy = [], [], []
     for i, view in enumerate(views):
@@ -180,7 +182,7 @@ def _observe(views: tuple[View, ...], ground: Array, scene: Scene, random: np.ra
     order = np.lexsort((view, point))
     counts = np.bincount(point, minlength=len(ground))
     kept = counts >= 2
-    rays = bundle.Rays(np.concatenate([[0], np.cumsum(counts)]).astype(np.int64), view[order].astype(np.int64), pixel[order])
+    rays = Rays(np.concatenate([[0], np.cumsum(counts)]).astype(np.int64), view[order].astype(np.int64), pixel[order])
     ground_kept = rays.only(kept)
     ground[: kept.sum()] = ground[kept]  # the array that the caller holds, without the points that nothing sees
     ground.resize((int(kept.sum()), 3), refcheck=False)

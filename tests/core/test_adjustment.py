@@ -8,9 +8,10 @@ from blocks import FRAME, Scene, flown
 from strandline.core.camera import Camera
 from strandline.core.errors import NotEnoughData
 from strandline.core.orientation import interior
-from strandline.core.orientation.adjustment import Control, Network, Positions, adjust
-from strandline.core.orientation.bundle import Cameras
+from strandline.core.orientation.adjustment import adjust
+from strandline.core.orientation.cameras import Cameras
 from strandline.core.orientation.common import bending_design, of_adjustment
+from strandline.core.orientation.network import Control, Network, Positions
 from strandline.core.orientation.reliability import tests as observation_tests
 from strandline.core.orientation.reliability import without
 from strandline.core.orientation.sightings import Sighting
