@@ -56,6 +56,8 @@ class Scene:
     wrong_mark: float = 0.0  # px, of the first control point's first mark
     wrong_gcp: float = 0.0  # m, of the second control point in plan
     wrong_height: float = 0.0  # m, of the second control point
+    single: int = 0  # control points that are marked once, the last ones
+    wrong_single: float = 0.0  # px, of these marks
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,7 @@ class Flown:
     camera: Camera
     true_views: tuple[View, ...]
     true_points: Array  # ground points (n, 3)
+    true_ties: Array  # tie points (p, 3)
     gsd: float
 
     def start(self) -> Solution:
@@ -111,7 +114,7 @@ def flown(scene: Scene, *, calibration: Camera | None = None) -> Flown:
     sigmas = np.tile(scene.gnss if scene.declared else (1.0, 1.5), (len(views), 1))
     gnss = Gnss(np.arange(len(views)), FRAME.to_crs(noisy), sigmas, scene.declared, np.zeros(3))
     assembly = oriented(views, ground, rays, scene, random, calibration)
-    return Flown(scene, assembly, points, gnss, camera, views, laid, gsd)
+    return Flown(scene, assembly, points, gnss, camera, views, laid, ground, gsd)
 
 
 def oriented(
@@ -212,6 +215,9 @@ def _surveyed(views: tuple[View, ...], laid: Array, scene: Scene, random: np.ran
                     continue
             x, y = pixel + random.standard_normal(2) * scene.mark
             marks.append(Mark(f"P{k}", view.name, float(x), float(y)))
+        if scene.control - scene.single <= k < scene.control:
+            middle = min(marks, key=lambda m: np.hypot(m.x - scene.size[0] / 2, m.y - scene.size[1] / 2))
+            marks = [replace(middle, x=middle.x + scene.wrong_single)]
         if k == 0 and marks and scene.wrong_mark:
             marks[0] = replace(marks[0], x=marks[0].x + scene.wrong_mark)
         made.append(GroundPoint(f"P{k}", given[k], k >= scene.control, *scene.gcp, tuple(marks)))

@@ -150,6 +150,8 @@ def test_points_follow_and_their_covariance_is_the_whole_ones(small):
     for p in range(len(points)):
         part = slice(n + 3 * p, n + 3 * p + 3)
         assert got[p] == pytest.approx(whole[part, part], rel=1e-6, abs=1e-12)
+    alike = bundle.covariances(*arguments(cameras, rays, points, weight), cameras.interior_column, whole[:n, :n])
+    assert alike == pytest.approx(got, rel=1e-9, abs=1e-14)
     moved = bundle.follow(*arguments(cameras, rays, points, weight), cameras.interior_column, solved[:n])
     assert (moved - points).ravel() == pytest.approx(solved[n:], rel=1e-6, abs=1e-9)
 
