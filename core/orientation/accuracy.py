@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 
 DOMING_POINTS = 8  # with fewer, the test of the quadratic term has next to no power
 _CONFIDENCE = 0.95
+_NORMAL = float(stats.norm.ppf(0.5 + _CONFIDENCE / 2))
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ def alti(errors: Array) -> float | None:
     return float(np.sqrt(np.mean(errors[:, 2] ** 2))) if len(errors) else None
 
 
-def doming(places: Array, heights: Array, sigmas: Array | None, limit: float) -> Doming | None:
+def doming(places: Array, heights: Array, sigmas: Array | None, limit: float, common: Array | None = None) -> Doming | None:
     """Fit ``dU = a0 + a1 E + a2 N + a3 r^2`` to height errors (n,) at places (n, 2); r counts from the places' mean.
 
     Parameters
@@ -50,6 +51,9 @@ def doming(places: Array, heights: Array, sigmas: Array | None, limit: float) ->
     sigmas
         Of each error of its own (n,): surveying and marks, without what the georeferencing adds. Errors of their own are
         independent of each other, while leave-one-out errors are not. None when they are alike and not known.
+    common
+        The covariance (n, n) of what the errors have in common because the block may be bent as its own covariance says: a bend
+        that is expected is no alarm. Shift and tilt in it count for nothing.
     limit
         The amplitude (m) below which a dome does not matter.
 
@@ -77,6 +81,9 @@ def doming(places: Array, heights: Array, sigmas: Array | None, limit: float) ->
     solved, *_ = np.linalg.lstsq(weighted, right, rcond=None)
     left, free = right - weighted @ solved, len(d) - 4
     factor = max(float(left @ left) / free, 0.0 if sigmas is None else 1.0)
-    amplitude, sigma = float(solved[3]), float(np.sqrt(factor * np.linalg.inv(weighted.T @ weighted)[3, 3]))
-    bound = float(stats.t.ppf(0.5 + _CONFIDENCE / 2, free)) * sigma
-    return Doming(amplitude, sigma, abs(amplitude) > max(bound, limit))
+    fit = np.linalg.solve(weighted.T @ weighted, weighted.T)[3] / own
+    expected = 0.0 if common is None else max(float(fit @ common @ fit), 0.0)
+    amplitude, variance = float(solved[3]), factor * float(np.linalg.inv(weighted.T @ weighted)[3, 3])
+    # Student's quantile is for a variance that residuals tell; what the block's covariance expects is known.
+    bound = np.sqrt(float(stats.t.ppf(0.5 + _CONFIDENCE / 2, free)) ** 2 * variance + _NORMAL**2 * expected)
+    return Doming(amplitude, float(np.sqrt(variance + expected)), abs(amplitude) > max(float(bound), limit))

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from ..errors import NotEnoughData
 from . import bundle
-from .bundle import POSE, Cameras, Rays
-from .gnss import offsets
-from .independence import design_effect
-from .interior import Interior
+from .adjusted import Adjusted
+from .cameras import POSE, Cameras
+from .network import Control, Network, Positions, antennas, tie_residuals
 from .normals import inverse, solve
-from .sightings import Sighting, meet, rows
+from .sightings import rows
 
 Array = NDArray[np.float64]
 
@@ -33,110 +32,6 @@ _HALVINGS = 8  # of a step that overshoots
 _GAIN = 1e-6  # of the sum of squares in sigmas: below, no unknown moves by more than a thousandth of its own
 _NOISE = 1e-10  # of the cost: what rounding may add
 _LEAST_SIGMA = 1e-4  # px; keeps exact observations solvable
-
-
-@dataclass(frozen=True)
-class Control:
-    """A sighting of a point surveyed at ``ground`` (3,) of the local frame with ``covariance`` (3, 3)."""
-
-    sighting: Sighting
-    ground: Array
-    covariance: Array
-
-
-@dataclass(frozen=True)
-class Positions:
-    """Antennas (g, 3) of the local frame in the views ``view`` (g,), with sigmas (g, 3), and the lever to them (3,).
-
-    ``shared`` (3,) is the prior sigma of an error that all have in common, inf for a free one, 0 for none.
-    """
-
-    view: NDArray[np.int64]
-    antenna: Array
-    sigma: Array
-    lever: Array
-    shared: Array
-
-    def __len__(self) -> int:
-        """Return the number of positions."""
-        return len(self.view)
-
-
-@dataclass(frozen=True)
-class Network:
-    """All that is adjusted: approximate cameras, what is known of their interiors, tie points (p, 3) and their rays."""
-
-    cameras: Cameras
-    interiors: tuple[Interior, ...]
-    ties: Rays
-    points: Array
-
-
-@dataclass(frozen=True)
-class Adjusted:
-    """An adjustment that stands.
-
-    ``places`` (k, 3) are the adjusted control points; ``bias`` (3,) the positions' common error; ``sigma`` the tie points'
-    sigma per axis (px), ``weight`` (m,) of their rays (px^-2). ``cofactor`` (u, u) is the covariance of the unknowns: poses,
-    interior parameters, bias.
-    """
-
-    network: Network
-    control: tuple[Control, ...]
-    positions: Positions
-    places: Array
-    bias: Array
-    sigma: float
-    effect: float
-    weight: Array
-    cofactor: Array
-
-    @property
-    def cameras(self) -> Cameras:
-        """The adjusted cameras."""
-        return self.network.cameras
-
-    def design_effect(self) -> float:
-        """Return how much the tie points overstate themselves, by their residuals."""
-        ties = self.network.ties
-        return design_effect(_tie_residuals(self.network), self.weight * self.sigma**2 * self.effect, ties.view, ties.xy)
-
-    def position_residuals(self) -> Array:
-        """Return antennas as given minus computed (g, 3), without the common error."""
-        return self.positions.antenna - _antennas(self.cameras, self.positions)
-
-    def interior_covariance(self, camera: int) -> Array:
-        """Return the covariance (q, q) of a camera's free parameters."""
-        first = self.cameras.interior_column[camera]
-        part = slice(first, first + self.cameras.free[camera])
-        return self.cofactor[part, part]
-
-    def intersect(self, sighting: Sighting, cofactor: Array | None = None, change: Array | None = None) -> tuple[Array, Array]:
-        """Return where the marks of a point that took no part meet (3,), and the covariance (3, 3) of that.
-
-        ``cofactor`` and ``change`` (u,) are those of an adjustment that differs a little from this one. NaN where they do not
-        meet.
-        """
-        cameras = self.cameras if change is None else self.cameras.moved(change[: self.cameras.columns])
-        point = meet(cameras, sighting)
-        jacobian, by_point, residual = rows(cameras, sighting, point, len(self.cofactor))
-        if not np.isfinite(residual).all():
-            return np.full(3, np.nan), np.full((3, 3), np.nan)
-        weight = np.repeat(1.0 / sighting.sigma**2, 2)
-        held = np.linalg.inv(by_point.T @ (weight[:, None] * by_point))
-        follow = -held @ by_point.T @ (weight[:, None] * jacobian)
-        return point, held + follow @ (self.cofactor if cofactor is None else cofactor) @ follow.T
-
-    def influence(self, chosen: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Return how tie points (s,) follow the unknowns (s, 3, u), and their covariance with these held (s, 3, 3)."""
-        c, t = self.cameras, self.network.ties
-        follows, held = bundle.influence(
-            t.start, t.view, t.xy, self.weight, self.network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free,
-            c.interior_column, c.columns, chosen,
-        )  # fmt: skip
-        wide = np.zeros((len(chosen), 3, len(self.cofactor)))
-        wide[:, :, : c.columns] = follows
-        return wide, held
 
 
 def adjust(
@@ -214,7 +109,7 @@ class _System:
 
 
 def _weights(state: _State, positions: Positions, sigma: float, effect: float) -> _Weights:
-    left = positions.antenna - _antennas(state.network.cameras, positions) - state.bias
+    left = positions.antenna - antennas(state.network.cameras, positions) - state.bias
     return _Weights(_tie_weights(state.network, sigma) / effect, position_weights(left, positions.sigma))
 
 
@@ -229,13 +124,13 @@ def _moved(state: _State, control: Sequence[Control], weights: _Weights, change:
 def _cost(state: _State, control: Sequence[Control], positions: Positions, weights: _Weights) -> float:
     """Return the sum of weighted squares; infinite when a ray that could be seen no longer can."""
     network, cameras = state.network, state.network.cameras
-    tie = _tie_residuals(network)
+    tie = tie_residuals(network)
     total = float(np.sum(np.where(weights.tie > 0, weights.tie * np.sum(tie**2, axis=1), 0.0)))
     for c, interior in enumerate(network.interiors):
         off = interior.known - interior.values(cameras.brown[c])
         total += float(off @ interior.information @ off)
     if len(positions):
-        left = positions.antenna - _antennas(cameras, positions) - state.bias
+        left = positions.antenna - antennas(cameras, positions) - state.bias
         total += float(np.sum(weights.position * left**2))
         if (positions.shared > 0).any():
             total += float(np.sum((state.bias / np.where(positions.shared > 0, positions.shared, _LEAST_SIGMA)) ** 2))
@@ -250,10 +145,7 @@ def _system(state: _State, control: Sequence[Control], positions: Positions, wei
     network, bias = state.network, state.bias
     c, t = network.cameras, network.ties
     columns = c.columns
-    matrix, side, residuals = bundle.reduce(
-        t.start, t.view, t.xy, weights.tie, network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free,
-        c.interior_column, columns,
-    )  # fmt: skip
+    matrix, side, residuals = bundle.reduce(t.arrays, weights.tie, network.points, c.arrays, c.interior_column, columns)
     matrix = np.triu(matrix) + np.triu(matrix, 1).T
     for k, (first, interior) in enumerate(zip(c.interior_column, network.interiors, strict=True)):
         part = slice(first, first + len(interior.names))
@@ -281,7 +173,7 @@ def _system(state: _State, control: Sequence[Control], positions: Positions, wei
 
 def _add_positions(matrix: Array, side: Array, cameras: Cameras, positions: Positions, bias: Array, weight: Array) -> None:
     with_bias = len(side) > cameras.columns
-    left = positions.antenna - _antennas(cameras, positions) - bias
+    left = positions.antenna - antennas(cameras, positions) - bias
     for view, w, r in zip(positions.view, weight, left, strict=True):
         own = np.arange(POSE * view + 3, POSE * view + 6)
         matrix[own, own] += w
@@ -302,34 +194,8 @@ def position_weights(left: Array, sigma: Array) -> Array:
     return np.asarray(shrink / sigma**2)
 
 
-def _antennas(cameras: Cameras, positions: Positions) -> Array:
-    centres, turns = cameras.centre[positions.view], cameras.rotation[positions.view]
-    return np.asarray(centres + offsets(turns, positions.lever))
-
-
-def _tie_residuals(network: Network) -> Array:
-    """Return observed minus computed (m, 2) of the tie points' rays, NaN where a point cannot be seen."""
-    c, t = network.cameras, network.ties
-    return np.asarray(
-        bundle.intersect(
-            t.start,
-            t.view,
-            t.xy,
-            np.ones(len(t.view)),
-            network.points,
-            c.rotation,
-            c.centre,
-            c.camera,
-            c.brown,
-            c.basis,
-            c.free,
-            0,
-        )[1]
-    )
-
-
 def _tie_weights(network: Network, sigma: float) -> Array:
-    length = np.hypot(*_tie_residuals(network).T) / sigma
+    length = np.hypot(*tie_residuals(network).T) / sigma
     weight = np.minimum(1.0, _HUBER / np.maximum(np.where(np.isfinite(length), length, np.inf), 1e-12)) / sigma**2
     return np.asarray(weight)
 
@@ -347,15 +213,8 @@ def _tie_sigma(residuals: Array, shrink: Array, network: Network) -> float:
 def _followed(network: Network, moved: Cameras, weight: Array, change: Array) -> Array:
     """Return the points after the change: by the linear equations, then to where their rays meet, which long steps miss."""
     c, t = network.cameras, network.ties
-    points = bundle.follow(
-        t.start, t.view, t.xy, weight, network.points, c.rotation, c.centre, c.camera, c.brown, c.basis, c.free,
-        c.interior_column, change,
-    )  # fmt: skip
-    return np.asarray(
-        bundle.intersect(
-            t.start, t.view, t.xy, weight, points, moved.rotation, moved.centre, moved.camera, moved.brown, moved.basis,
-            moved.free, 1 )[0]
-    )  # fmt: skip
+    points = bundle.follow(t.arrays, weight, network.points, c.arrays, c.interior_column, change)
+    return np.asarray(bundle.intersect(t.arrays, weight, points, moved.arrays, 1)[0])
 
 
 def _follow_control(control: Sequence[Control], cameras: Cameras, places: Array, change: Array) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..report.html import Report
 from .solution import AdjustedCamera, Solution
+from .tieprecision import CAPTION, medians, precision_map
 
 _ORIGINS = {
     "files": "the photographs' files",
@@ -34,9 +35,13 @@ def add(page: Report, solution: Solution) -> None:
         )
     page.heading("Adjustment")
     rows: list[list[Any]] = [["tie points, sigma of a coordinate (px)", solution.pixel_sigma]]
-    if solution.tie_sigma is not None:
-        east, north, up = map(float, solution.tie_sigma)
-        rows += [["tie points, median sigma in plan (m)", float(np.hypot(east, north))], ["  in height (m)", up]]
+    told = medians(solution)
+    if told is not None:
+        for label, (east, north, up) in zip(("median sigma", "95 % are below"), told, strict=True):
+            rows += [
+                [f"tie points of three rays, {label} in plan (m)", float(np.hypot(east, north))],
+                ["  in height (m)", float(up)],
+            ]
     if solution.centre_sigma is not None:
         plan = np.hypot(solution.centre_sigma[:, 0], solution.centre_sigma[:, 1])
         rows += [
@@ -49,6 +54,9 @@ def add(page: Report, solution: Solution) -> None:
         "Sigmas come from the covariance of the whole adjustment: none holds other unknowns fixed. Tie points are an even "
         "choice, one or more in every patch of every photograph, since neighbours repeat each other."
     )
+    figure = precision_map(solution)
+    if figure is not None:
+        page.figure(figure, CAPTION)
     for camera in solution.cameras:
         _add_camera(page, camera)
 

@@ -12,7 +12,8 @@ from ..block import Block
 from ..errors import NotEnoughData
 from ..frames import LocalFrame
 from .accuracy import alti, plani
-from .adjustment import Adjusted, adjust
+from .adjusted import Adjusted
+from .adjustment import adjust
 from .gnss import SHARED, Gnss
 from .observations import Seen, Solver, undetermined
 from .sightings import Sighting
@@ -46,6 +47,7 @@ def alternatives(
     if not judged:
         return []
     order = _spread(np.array([c.ground for c in adjusted.control]).reshape(-1, 3))
+    order.sort(key=lambda k: len(adjusted.control[k].sighting.view) < 2)  # a point with one mark comes last
     counts = [n for n in _COUNTS if n < len(order)] + [len(order)]
     choices = [[adjusted.control[k].sighting.name for k in order[:count]] for count in counts]
     found = list(_similarities(block, solution, gnss, choices, checks))

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ..block import Block, View
 from ..camera import PARAMETERS, Camera
 from . import bundle
-from .adjustment import Network
-from .bundle import Cameras, Rays
+from .cameras import Cameras, Rays
 from .evenness import even_choice
 from .interior import Interior, merged
+from .network import Network
 from .similarity import Similarity
 
 Array = NDArray[np.float64]
@@ -94,11 +94,7 @@ def adjusted_block(
         View(view.name, _camera(view.camera, cameras.brown[c]), turn, -turn @ centre)
         for view, c, turn, centre in zip(block.views, cameras.camera, cameras.rotation, cameras.centre, strict=True)
     )
-    c = cameras
-    points, residuals = bundle.intersect(
-        rays.start, rays.view, rays.xy, np.ones(len(rays.view)), similarity.apply(block.points), c.rotation, c.centre, c.camera,
-        c.brown, c.basis, c.free, 4,
-    )  # fmt: skip
+    points, residuals = bundle.intersect(rays.arrays, np.ones(len(rays.view)), similarity.apply(block.points), cameras.arrays, 4)
     length = np.hypot(*residuals.T)
     counts = np.diff(rays.start)
     mean = np.add.reduceat(length, rays.start[:-1]) / np.maximum(counts, 1) if len(length) else np.zeros(0)

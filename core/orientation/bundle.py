@@ -1,161 +1,18 @@
-"""Kernels of the bundle adjustment: collinearity with Brown's distortion, its derivatives, and reduced normal equations.
+"""Kernels of the bundle adjustment: reduced normal equations of tie points, and how the points go with the cameras.
 
-Tie points are eliminated one by one (Brown 1958; Schur's complement), so that what remains are poses and interior orientations.
-A pose is a rotation R, changed to exp(w) R, and the projection centre C: ``x_camera = R (X - C)``. The columns of the
-reduced system hold w and C of each view (6), then the free interior parameters of each camera. Everything runs on one thread in
-one order: two runs give the same bits.
+Tie points are eliminated one by one (Brown 1958; Schur's complement), so that what remains are poses and interior orientations,
+in the columns that ``cameras`` describes. ``rays`` and ``cameras`` are ``Rays.arrays`` and ``Cameras.arrays``. Everything runs on
+one thread in one order: two runs give the same bits.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from .collinearity import project
 
-POSE = 6  # columns of a view: rotation (rad, about the camera's axes), projection centre (m)
 _WEAK = 1e-12  # of a point's normal matrix: below, its rays are parallel and it says nothing
-
-
-@dataclass(frozen=True)
-class Rays:
-    """Observations of points, sorted by point: point ``p`` has the observations ``start[p]`` to ``start[p + 1]``.
-
-    ``view`` (m,) indexes the views, ``xy`` (m, 2) are pixels.
-    """
-
-    start: Index
-    view: Index
-    xy: Array
-
-    def __len__(self) -> int:
-        """Return the number of points."""
-        return len(self.start) - 1
-
-    @property
-    def point(self) -> Index:
-        """The point (m,) of each observation."""
-        return np.repeat(np.arange(len(self)), np.diff(self.start))
-
-    def only(self, points: NDArray[np.bool_]) -> Rays:
-        """Return the rays of some points (n,)."""
-        counts = np.diff(self.start)
-        kept = np.repeat(points, counts)
-        return Rays(np.concatenate([[0], np.cumsum(counts[points])]).astype(np.int64), self.view[kept], self.xy[kept])
-
-
-@dataclass(frozen=True)
-class Cameras:
-    """Exterior and interior orientation: ``rotation`` (n, 3, 3), ``centre`` (n, 3), the ``camera`` (n,) of each view.
-
-    ``brown`` (c, 12) are fx, fy, cx, cy, k1, k2, p1, p2, k3 to k6 of each camera; ``basis`` (c, 12, q) are their derivatives by
-    the free interior parameters, padded with zero columns, of which the first ``free`` (c,) count.
-    """
-
-    rotation: Array
-    centre: Array
-    camera: Index
-    brown: Array
-    basis: Array
-    free: Index
-
-    @property
-    def interior_column(self) -> Index:
-        """The first column (c,) of each camera's free parameters in the reduced system."""
-        return np.asarray(POSE * len(self.centre) + np.concatenate([[0], np.cumsum(self.free)[:-1]]), np.int64)
-
-    @property
-    def columns(self) -> int:
-        """The number of columns of the reduced system."""
-        return POSE * len(self.centre) + int(self.free.sum())
-
-    def moved(self, change: Array) -> Cameras:
-        """Return the cameras after a change (columns,)."""
-        n = len(self.centre)
-        poses = change[: POSE * n].reshape(n, POSE)
-        brown = self.brown.copy()
-        for c, (column, free) in enumerate(zip(self.interior_column, self.free, strict=True)):
-            brown[c] += self.basis[c, :, :free] @ change[column : column + free]
-        turned = rotations(poses[:, :3]) @ self.rotation
-        return Cameras(turned, self.centre + poses[:, 3:], self.camera, brown, self.basis, self.free)
-
-
-def rotations(vectors: Array) -> Array:
-    """Return the rotation matrices (n, 3, 3) of rotation vectors (n, 3), radians (Rodrigues 1840)."""
-    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
-    cross = np.zeros((len(vectors), 3, 3))
-    x, y, z = vectors.T
-    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -z, y, -x
-    cross -= cross.transpose(0, 2, 1)
-    small = angle < 1e-6
-    safe = np.where(small, 1.0, angle)
-    one = np.where(small, 1.0 - angle**2 / 6, np.sin(safe) / safe)
-    two = np.where(small, 0.5 - angle**2 / 24, (1 - np.cos(safe)) / safe**2)
-    return np.asarray(np.eye(3) + one * cross + two * cross @ cross)
-
-
-@njit(cache=True)
-def project(point, rotation, centre, brown, xy, by_point, by_pose, by_brown):  # type: ignore[no-untyped-def]
-    """Write the pixel (2,) of ``point`` (3,) and its derivatives; tell whether the camera can see it.
-
-    Derivatives are by point (2, 3), pose (2, 6) and the twelve interior parameters (2, 12). A point behind the camera, or beyond
-    the radius from which the distortion folds back, cannot be seen.
-    """
-    d = point - centre
-    x = rotation[0, 0] * d[0] + rotation[0, 1] * d[1] + rotation[0, 2] * d[2]
-    y = rotation[1, 0] * d[0] + rotation[1, 1] * d[1] + rotation[1, 2] * d[2]
-    z = rotation[2, 0] * d[0] + rotation[2, 1] * d[1] + rotation[2, 2] * d[2]
-    if z <= 0.0:
-        return False
-    fx, fy, k1, k2, p1, p2 = brown[0], brown[1], brown[4], brown[5], brown[6], brown[7]
-    k3, k4, k5, k6 = brown[8], brown[9], brown[10], brown[11]
-    u, v = x / z, y / z
-    r2 = u * u + v * v
-    above = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    below = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6))
-    radial = above / below
-    above_r2 = k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3)
-    below_r2 = k4 + r2 * (2.0 * k5 + 3.0 * r2 * k6)
-    radial_r2 = (above_r2 - radial * below_r2) / below
-    if radial + 2.0 * r2 * radial_r2 <= 0.0:
-        return False
-    du = u * radial + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u)
-    dv = v * radial + p1 * (r2 + 2.0 * v * v) + 2.0 * p2 * u * v
-    xy[0], xy[1] = fx * du + brown[2], fy * dv + brown[3]
-    uu = radial + 2.0 * u * u * radial_r2 + 2.0 * p1 * v + 6.0 * p2 * u
-    uv = 2.0 * u * v * radial_r2 + 2.0 * p1 * u + 2.0 * p2 * v
-    vv = radial + 2.0 * v * v * radial_r2 + 6.0 * p1 * v + 2.0 * p2 * u
-    # by x, y, z of the camera's frame
-    ax, ay = fx * uu / z, fx * uv / z
-    az = -(ax * u + ay * v)
-    bx, by = fy * uv / z, fy * vv / z
-    bz = -(bx * u + by * v)
-    for j in range(3):
-        by_point[0, j] = ax * rotation[0, j] + ay * rotation[1, j] + az * rotation[2, j]
-        by_point[1, j] = bx * rotation[0, j] + by * rotation[1, j] + bz * rotation[2, j]
-        by_pose[0, 3 + j] = -by_point[0, j]
-        by_pose[1, 3 + j] = -by_point[1, j]
-    # a turn w moves x_camera by w x x_camera
-    by_pose[0, 0], by_pose[0, 1], by_pose[0, 2] = az * y - ay * z, ax * z - az * x, ay * x - ax * y
-    by_pose[1, 0], by_pose[1, 1], by_pose[1, 2] = bz * y - by * z, bx * z - bz * x, by * x - bx * y
-    by_brown[:, :] = 0.0
-    by_brown[0, 0], by_brown[1, 1] = du, dv
-    by_brown[0, 2], by_brown[1, 3] = 1.0, 1.0
-    power = r2
-    for k in (4, 5, 8):
-        by_brown[0, k], by_brown[1, k] = fx * u * power / below, fy * v * power / below
-        power *= r2
-    power = r2
-    for k in (9, 10, 11):
-        by_brown[0, k], by_brown[1, k] = -fx * u * radial * power / below, -fy * v * radial * power / below
-        power *= r2
-    by_brown[0, 6], by_brown[1, 6] = fx * 2.0 * u * v, fy * (r2 + 2.0 * v * v)
-    by_brown[0, 7], by_brown[1, 7] = fx * (r2 + 2.0 * u * u), fy * 2.0 * u * v
-    return True
 
 
 @njit(cache=True)
@@ -177,20 +34,33 @@ def _inverse(a, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _point_system(  # type: ignore[no-untyped-def]
-    first, last, view, xy, weight, point, rotation, centre, camera, brown, basis, free, residual, jacobian, mixed, normal, right
-):
-    """Fill a point's normal matrix (3, 3) and right side (3,), and per ray the residual, its derivatives by what is reduced.
+def _work(start, basis):  # type: ignore[no-untyped-def]
+    """Return what ``_point_system`` fills, large enough for the point of most rays.
 
-    ``jacobian`` (rays, 2, 6 + q) and ``mixed`` (rays, 6 + q, 3), the weighted product with the derivatives by the point.
-    Tells whether all rays can be.
+    Per ray the residual (rays, 2), its derivatives by what is reduced (rays, 2, 6 + q), and ``mixed`` (rays, 6 + q, 3), the
+    weighted product of these with the derivatives by the point; of the point its normal matrix (3, 3), right side (3,) and the
+    matrix's inverse (3, 3).
     """
+    most, q = 0, basis.shape[2]
+    for p in range(len(start) - 1):
+        most = max(most, start[p + 1] - start[p])
+    residual, jacobian, mixed = np.empty((most, 2)), np.zeros((most, 2, 6 + q)), np.zeros((most, 6 + q, 3))
+    return residual, jacobian, mixed, np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+
+
+@njit(cache=True)
+def _point_system(p, rays, weight, points, cameras, work):  # type: ignore[no-untyped-def]
+    """Fill ``work`` with the equations of point ``p``; tell whether all its rays can be, and meet."""
+    start, view, xy = rays
+    rotation, centre, camera, brown, basis, free = cameras
+    residual, jacobian, mixed, normal, right, inverse = work
     at, by_point, by_pose, by_brown = np.empty(2), np.empty((2, 3)), np.empty((2, 6)), np.empty((2, 12))
     normal[:, :] = 0.0
     right[:] = 0.0
-    for i in range(first, last):
+    first = start[p]
+    for i in range(first, start[p + 1]):
         k, c = i - first, camera[view[i]]
-        if not project(point, rotation[view[i]], centre[view[i]], brown[c], at, by_point, by_pose, by_brown):
+        if not project(points[p], rotation[view[i]], centre[view[i]], brown[c], at, by_point, by_pose, by_brown):
             return False
         residual[k, 0], residual[k, 1] = xy[i, 0] - at[0], xy[i, 1] - at[1]
         w = weight[i]
@@ -209,35 +79,27 @@ def _point_system(  # type: ignore[no-untyped-def]
         for j in range(6 + free[c]):
             for a in range(3):
                 mixed[k, j, a] = w * (jacobian[k, 0, j] * by_point[0, a] + jacobian[k, 1, j] * by_point[1, a])
-    return True
+    return _inverse(normal, inverse)
 
 
 @njit(cache=True)
-def reduce(  # type: ignore[no-untyped-def]
-    start, view, xy, weight, points, rotation, centre, camera, brown, basis, free, column, size
-):
+def reduce(rays, weight, points, cameras, column, size):  # type: ignore[no-untyped-def]
     """Return the reduced normal matrix (size, size; upper triangle), its right side (size,) and residuals (m, 2).
 
     ``weight`` (m,) is 1 / sigma^2 of each ray per axis (px^-2). Residuals are observed minus computed, NaN of points that cannot
     be seen or whose rays are parallel; such points take no part.
     """
+    start, view, _ = rays
+    _, _, camera, _, basis, free = cameras
     matrix, side = np.zeros((size, size)), np.zeros(size)
     residuals = np.full((len(view), 2), np.nan)
-    most, q = 0, basis.shape[2]
-    for p in range(len(start) - 1):
-        most = max(most, start[p + 1] - start[p])
-    residual, jacobian = np.empty((most, 2)), np.zeros((most, 2, 6 + q))
-    mixed, gain = np.zeros((most, 6 + q, 3)), np.zeros((most, 6, 3))
-    normal, right, inverse = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    work = _work(start, basis)
+    residual, jacobian, mixed, _, right, inverse = work
+    gain, q = np.zeros((len(residual), 6, 3)), basis.shape[2]
     shared, shared_gain = np.zeros((len(free), q, 3)), np.zeros((q, 3))
     for p in range(len(start) - 1):
         first, last = start[p], start[p + 1]
-        if not _point_system(
-            first, last, view, xy, weight, points[p], rotation, centre, camera, brown, basis, free, residual, jacobian, mixed,
-            normal, right,
-        ):  # fmt: skip
-            continue
-        if not _inverse(normal, inverse):
+        if not _point_system(p, rays, weight, points, cameras, work):
             continue
         half = np.zeros(3)
         for a in range(3):
@@ -297,24 +159,16 @@ def reduce(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def follow(  # type: ignore[no-untyped-def]
-    start, view, xy, weight, points, rotation, centre, camera, brown, basis, free, column, change
-):
+def follow(rays, weight, points, cameras, column, change):  # type: ignore[no-untyped-def]
     """Return the points (p, 3) that go with a ``change`` (size,) of the cameras; those that take no part stay."""
+    start, view, _ = rays
+    _, _, camera, _, basis, free = cameras
     moved = points.copy()
-    most, q = 0, basis.shape[2]
-    for p in range(len(start) - 1):
-        most = max(most, start[p + 1] - start[p])
-    residual, jacobian, mixed = np.empty((most, 2)), np.zeros((most, 2, 6 + q)), np.zeros((most, 6 + q, 3))
-    normal, right, inverse = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    work = _work(start, basis)
+    _, _, mixed, _, right, inverse = work
     for p in range(len(start) - 1):
         first, last = start[p], start[p + 1]
-        if not _point_system(
-            first, last, view, xy, weight, points[p], rotation, centre, camera, brown, basis, free, residual, jacobian, mixed,
-            normal, right,
-        ):  # fmt: skip
-            continue
-        if not _inverse(normal, inverse):
+        if not _point_system(p, rays, weight, points, cameras, work):
             continue
         for i in range(first, last):
             k, v = i - first, view[i]
@@ -329,29 +183,21 @@ def follow(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def influence(  # type: ignore[no-untyped-def]
-    start, view, xy, weight, points, rotation, centre, camera, brown, basis, free, column, size, chosen
-):
+def influence(rays, weight, points, cameras, column, size, chosen):  # type: ignore[no-untyped-def]
     """Return how the points ``chosen`` (s,) follow the cameras (s, 3, size), and their covariance (s, 3, 3) with these held.
 
     The former is -Hpp^-1 Hpa: with the cameras' covariance Q a point's is ``held + follow Q follow^T``. NaN of points that take
     no part.
     """
+    start, view, _ = rays
+    _, _, camera, _, basis, free = cameras
     follows, held = np.zeros((len(chosen), 3, size)), np.full((len(chosen), 3, 3), np.nan)
-    most, q = 0, basis.shape[2]
-    for p in range(len(start) - 1):
-        most = max(most, start[p + 1] - start[p])
-    residual, jacobian, mixed = np.empty((most, 2)), np.zeros((most, 2, 6 + q)), np.zeros((most, 6 + q, 3))
-    normal, right, inverse = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    work = _work(start, basis)
+    _, _, mixed, _, _, inverse = work
     for s in range(len(chosen)):
         p = chosen[s]
         first, last = start[p], start[p + 1]
-        if not _point_system(
-            first, last, view, xy, weight, points[p], rotation, centre, camera, brown, basis, free, residual, jacobian, mixed,
-            normal, right,
-        ):  # fmt: skip
-            continue
-        if not _inverse(normal, inverse):
+        if not _point_system(p, rays, weight, points, cameras, work):
             continue
         held[s] = inverse
         for i in range(first, last):
@@ -367,18 +213,63 @@ def influence(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def intersect(  # type: ignore[no-untyped-def]
-    start, view, xy, weight, points, rotation, centre, camera, brown, basis, free, rounds
-):
+def covariances(rays, weight, points, cameras, column, cofactor):  # type: ignore[no-untyped-def]
+    """Return the covariances (p, 3, 3) of points, ``Hpp^-1 + Hpp^-1 Hpa Q Hap Hpp^-1`` with the cameras' ``cofactor`` Q (u, u).
+
+    NaN of points that take no part. A point touches the columns of its own views and their cameras only.
+    """
+    start, view, _ = rays
+    _, _, camera, _, basis, free = cameras
+    found = np.full((len(start) - 1, 3, 3), np.nan)
+    work = _work(start, basis)
+    _, _, mixed, _, _, inverse = work
+    most = len(mixed) * 6 + len(free) * basis.shape[2]
+    follows, to, place = np.zeros((most, 3)), np.zeros(most, np.int64), np.zeros(len(free), np.int64)
+    for p in range(len(start) - 1):
+        first, last = start[p], start[p + 1]
+        if not _point_system(p, rays, weight, points, cameras, work):
+            continue
+        count = 0
+        place[:] = -1
+        for i in range(first, last):
+            k, v = i - first, view[i]
+            c = camera[v]
+            for j in range(6):
+                to[count] = 6 * v + j
+                follows[count] = mixed[k, j]
+                count += 1
+            if place[c] < 0:
+                place[c] = count
+                for j in range(free[c]):
+                    to[count] = column[c] + j
+                    follows[count] = 0.0
+                    count += 1
+            for j in range(free[c]):
+                follows[place[c] + j] += mixed[k, 6 + j]
+        total = np.zeros((3, 3))
+        for j in range(count):
+            for b in range(count):
+                q = cofactor[to[j], to[b]]
+                for a in range(3):
+                    for e in range(3):
+                        total[a, e] += follows[j, a] * q * follows[b, e]
+        found[p] = inverse + inverse @ total @ inverse
+    return found
+
+
+@njit(cache=True)
+def intersect(rays, weight, points, cameras, rounds):  # type: ignore[no-untyped-def]
     """Return the points (p, 3) that fit their rays best with the cameras held, and residuals (m, 2).
 
     By ``rounds`` of Gauss-Newton from ``points``; residuals are observed minus computed, NaN where a point cannot be seen.
     """
+    start, view, xy = rays
+    rotation, centre, camera, brown, basis, free = cameras
     column = np.zeros(len(free), np.int64)
-    none = np.zeros(len(free), np.int64)
+    held = rotation, centre, camera, brown, basis, np.zeros(len(free), np.int64)
     still = np.zeros(6 * len(centre) + 1)
     for _ in range(rounds):
-        points = follow(start, view, xy, weight, points, rotation, centre, camera, brown, basis, none, column, still)
+        points = follow(rays, weight, points, held, column, still)
     residuals = np.full((len(view), 2), np.nan)
     at, by_point, by_pose, by_brown = np.empty(2), np.empty((2, 3)), np.empty((2, 6)), np.empty((2, 12))
     for p in range(len(start) - 1):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .adjustment import Adjusted
+from .adjusted import Adjusted
 from .similarity import design_matrix
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .bundle import Rays
+from .cameras import Rays
 
 PATCHES = 48  # along the longer side of a photograph
 _TIED = 50  # points that two photographs have in common before their link counts as held

@@ -60,6 +60,11 @@ def findings(solution: Solution, inputs: Inputs, dome: Doming | None) -> list[st
     ]
     for seen in solution.seen:
         name = seen.point.name
+        if name in solution.single:
+            told.append(
+                f"{name} has one mark, which takes part; nothing but the block checks it, and it has no residual on the ground."
+            )
+            continue
         if seen.found is None:
             few = f"it has {seen.marks} mark{'s' * (seen.marks != 1)} in oriented photographs, and needs two"
             told.append(f"{name} is not used: {few if seen.marks < 2 else 'its marks do not meet in a point; check them'}.")

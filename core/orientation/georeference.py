@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import cv2  # noqa: F401 - before pycolmap, whose PNG library otherwise crashes OpenCV's
 import numpy as np
@@ -14,24 +14,26 @@ from numpy.typing import NDArray
 from ..block import Block
 from ..contract import VectorSource, encode
 from ..errors import InputError, NotEnoughData
-from ..files import digest, whole
+from ..files import digest
 from ..frames import LocalFrame
-from ..georef import FOLDER, CalibratedCamera, Georef
 from ..progress import SILENT, Progress
 from ..survey import Survey, held
 from ..vector import check_destination
 from . import georeport
 from .accuracy import Doming, alti, plani
 from .adjustedsolution import solve_adjustment
-from .assembly import assemble, write_back
+from .assembly import assemble
 from .calibration import interiors_of
 from .domes import dome_of
 from .findings import findings, verdict
 from .ignoring import outside
 from .inputs import Inputs, gather, read_given
+from .leaving import complete, georef_of, write_georeferenced
 from .observations import Seen, find_marks
+from .pointcloud import check_cloud
 from .solution import Solution, place, solve
 from .sparse import block_from_model, read_model
+from .tieprecision import write_tie_points
 
 Array = NDArray[np.float64]
 
@@ -41,7 +43,7 @@ VERSION = 2  # raise it when the same input would give another result
 
 @dataclass(frozen=True)
 class Request:
-    """Sigmas in metres (``sigma_mark`` in pixels); ``residuals`` and ``photos`` are GeoPackages to write.
+    """Sigmas in metres (``sigma_mark`` in pixels); ``residuals`` and ``photos`` are GeoPackages, ``tie_points`` a LAZ to write.
 
     ``marks`` has the columns gcp, image, x, y: pixels from the CORNER of the top-left pixel (ODM's file counts from its
     centre and is brought to that). ``check`` is names separated by commas; ``lever_arm`` three numbers from the projection
@@ -71,6 +73,7 @@ class Request:
     crs: str | None = None
     residuals: str | None = None
     photos: str | None = None
+    tie_points: str | None = None
     output_html_file: str | None = None
 
 
@@ -94,6 +97,7 @@ class Result:
     plani_gnss: float | None
     alti_gnss: float | None
     doming: float | None
+    tie_points: str | None = None
 
 
 def run(request: Request, progress: Progress = SILENT) -> Result:
@@ -117,7 +121,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         progress.at(0.3)
         inputs = gather(request, survey, given, block)
         fingerprint = _fingerprint(request, inputs, oriented.fingerprint)
-        solution = _solve(block, inputs, request.sigma_mark)
+        solution = _solve(block, inputs, request)
         usable = np.ones(len(block.points), bool)
         if inputs.ignore is not None:
             usable = outside(solution, inputs.ignore)
@@ -126,16 +130,19 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         else:
             solution = replace(solution, block=solution.block.only(usable), kept=usable)
         result, dome = _result(request, solution, inputs)
-        georef = _georef(solution, inputs, result)
+        numbers = {k: v for k, v in encode(result).items() if k not in ("output", "tie_points")}
+        georef = georef_of(solution, inputs.heights.kind, numbers)
         told = findings(solution, inputs, dome)
         for text in told:
             progress.warn(text)
         standing = survey.record(STEP)
-        if standing is None or standing.fingerprint != fingerprint or survey.is_stale(STEP) or not _complete(survey):
+        if standing is None or standing.fingerprint != fingerprint or survey.is_stale(STEP) or not complete(survey):
             write_georeferenced(model, solution, survey)
             georef.write(survey)
         progress.at(0.8)
         georeport.write_layers(request.residuals, request.photos, solution, inputs)
+        if request.tie_points:
+            write_tie_points(request.tie_points, solution)
         report = georeport.report(solution, inputs, result, dome, told)
         report.save(survey.report_path(STEP), request.output_html_file)
         survey.finish(
@@ -148,18 +155,6 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         progress.info(verdict(solution, result))
         progress.at(1.0)
     return result
-
-
-def write_georeferenced(model: pycolmap.Reconstruction, solution: Solution, survey: Survey) -> None:
-    """Write ``model``, brought to the solution, as the survey's georeferenced model; ids stay. ``model`` is changed in place."""
-    similarity = solution.similarity
-    turn = pycolmap.Rotation3d(similarity.rotation)
-    model.transform(pycolmap.Sim3d(similarity.scale, turn, similarity.shift))
-    write_back(model, solution.block, solution.kept)
-    # A kill from there to finish() leaves a survey that is not georeferenced, never one whose two files disagree.
-    with whole(survey.folder / FOLDER, before=lambda: survey.forget(STEP)) as part:
-        part.mkdir()
-        model.write(part)
 
 
 def check_parameters(request: Request) -> None:
@@ -182,6 +177,8 @@ def check_parameters(request: Request) -> None:
     for path in (request.residuals, request.photos):
         if path:
             check_destination(path)
+    if request.tie_points:
+        check_cloud("TIE_POINTS", request.tie_points)
 
 
 def _fingerprint(request: Request, inputs: Inputs, oriented: str) -> str:
@@ -194,9 +191,9 @@ def _fingerprint(request: Request, inputs: Inputs, oriented: str) -> str:
     return digest(VERSION, oriented, request.method, request.sigma_mark, inputs.crs, points, positions, inputs.heights, ignored)
 
 
-def _solve(block: Block, inputs: Inputs, sigma_mark: float) -> Solution:
-    seen = find_marks(block, inputs.control.points, sigma_mark)
-    _enough(seen, inputs)
+def _solve(block: Block, inputs: Inputs, request: Request) -> Solution:
+    seen = find_marks(block, inputs.control.points, request.sigma_mark)
+    _enough(seen, inputs, request.method)
     places = [s.point.coordinates for s in seen if s.found is not None] or list(inputs.gnss.coordinates)
     if not places:
         raise NotEnoughData("There is neither a GCP nor a GNSS position with a height: give GCPS and MARKS, or GCP_FILE.")
@@ -250,8 +247,10 @@ def _adjusted(
     return solved(again, True)
 
 
-def _enough(seen: Sequence[Seen], inputs: Inputs) -> None:
+def _enough(seen: Sequence[Seen], inputs: Inputs, method: str) -> None:
     control = [s for s in seen if not s.point.check]
+    if method == "adjustment" and len(inputs.gnss) and any(s.single for s in control):
+        return  # positions place the block, and a single mark tells where its point lies in it
     if control and all(s.found is None for s in control):
         raise NotEnoughData(
             f"None of the {len(control)} control points of {inputs.control.where} has marks in two oriented photographs: "
@@ -268,7 +267,7 @@ def _result(request: Request, solution: Solution, inputs: Inputs) -> tuple[Resul
     dome = dome_of(solution, inputs.gnss)
     result = Result(
         request.survey,
-        len(control),
+        len(control) + len(solution.single),
         len(checks),
         plani(control),
         alti(control),
@@ -279,29 +278,6 @@ def _result(request: Request, solution: Solution, inputs: Inputs) -> tuple[Resul
         plani(solution.gnss_errors),
         gnss_alti,
         dome.amplitude if dome else None,
+        request.tie_points,
     )
     return result, dome
-
-
-def _georef(solution: Solution, inputs: Inputs, result: Result) -> Georef:
-    similarity = solution.similarity
-    numbers: dict[str, Any] = {k: v for k, v in encode(result).items() if k != "output"}
-    return Georef(
-        solution.frame,
-        solution.method,
-        (similarity.scale, *map(float, similarity.rotation.ravel()), *map(float, similarity.shift)),
-        tuple(map(float, solution.common.pivot)),
-        tuple(map(float, solution.common.covariance.ravel())),
-        numbers,
-        inputs.heights.kind,
-        tuple(
-            CalibratedCamera(c.label, c.names, tuple(map(float, c.values)), tuple(map(float, c.covariance.ravel())))
-            for c in solution.cameras
-            if c.names
-        ),
-    )
-
-
-def _complete(survey: Survey) -> bool:
-    folder = survey.folder
-    return (folder / FOLDER).is_dir() and (folder / "georef.json").is_file() and survey.report_path(STEP).is_file()

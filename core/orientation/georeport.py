@@ -40,7 +40,7 @@ def report(solution: Solution, inputs: Inputs, result: Result, dome: Doming | No
     page.table(
         ["", "points", "plan (m)", "height (m)"],
         [
-            ["control points, residuals", result.control_count, result.plani_control, result.alti_control],
+            ["control points, residuals", result.control_count - len(solution.single), result.plani_control, result.alti_control],
             ["check points", result.check_count, result.plani_check, result.alti_check],
             ["  as predicted for these", _known(solution.predicted), *_rms_sigma(solution.predicted)],
             ["control points, each left out", _count(solution.loo), result.plani_loo, result.alti_loo],
@@ -121,7 +121,7 @@ def _residual_fields(solution: Solution) -> dict[str, Any]:
     marks_px = [None if s.found is None else _rms_pixels(s) for s in seen]
     return {
         "name": [s.point.name for s in seen],
-        "role": [_role(s) for s in seen],
+        "role": [_role(s, solution) for s in seen],
         "marks": [s.marks for s in seen],
         **_components(solution.errors),
         "plani": np.hypot(solution.errors[:, 0], solution.errors[:, 1]),
@@ -158,7 +158,7 @@ def _row(solution: Solution, index: int) -> list[Any]:
     plan = float(np.hypot(error[0], error[1]))
     return [
         seen.point.name,
-        _role(seen),
+        _role(seen, solution),
         seen.marks,
         *map(float, error),
         plan,
@@ -174,8 +174,10 @@ def _rms_pixels(seen: Seen) -> float | None:
     return float(np.sqrt(np.mean(np.sum(seen.found.residuals[seen.found.used] ** 2, axis=1))))
 
 
-def _role(seen: Seen) -> str:
+def _role(seen: Seen, solution: Solution) -> str:
     role = "check" if seen.point.check else "control"
+    if seen.point.name in solution.single:
+        return f"{role}, one mark"
     return role if seen.found is not None else f"{role}, not used"
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..errors import NotEnoughData
-from .bundle import POSE
+from .cameras import POSE
 
 Array = NDArray[np.float64]
 

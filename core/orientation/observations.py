@@ -29,6 +29,7 @@ class Seen:
     found: Triangulated | None
     marks: int
     wrong: tuple[str, ...] = ()  # marks that the others contradict
+    single: str | None = None  # the photograph of the only mark
 
 
 def find_marks(block: Block, points: Sequence[GroundPoint], sigma_mark: float) -> tuple[Seen, ...]:
@@ -43,7 +44,7 @@ def find_marks(block: Block, points: Sequence[GroundPoint], sigma_mark: float) -
         if len(marks) >= 2:
             found = triangulate([views[m.image] for m in marks], np.array([[m.x, m.y] for m in marks]), sigma)
         wrong = () if found is None else tuple(m.image for m, used in zip(marks, found.used, strict=True) if not used)
-        seen.append(Seen(point, found, len(marks), wrong))
+        seen.append(Seen(point, found, len(marks), wrong, marks[0].image if len(marks) == 1 else None))
     return tuple(seen)
 
 

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pycolmap
 
 from ..camera import Camera
-from ..errors import InputError, NotEnoughData
+from ..errors import NotEnoughData
 from ..files import copy_file, digest, whole
 from ..photographs.listing import some
 from ..progress import SILENT, Progress
@@ -28,7 +27,7 @@ from .calibration import MODEL, read_calibration
 from .focal import CALIBRATION_SIGMA, FILE_SIGMA, FocalPrior, far_off
 from .mapping import Network, camera_from_colmap, map_photographs, read_network, triangulate
 from .orientreport import Orientation, write_report
-from .pointcloud import write_points
+from .pointcloud import check_cloud, write_points
 from .sparse import block_from_model
 
 VERSION = 4  # raise it when the same input would give another result
@@ -79,8 +78,8 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     NotEnoughData
         When no two photographs can be oriented to each other.
     """
-    if request.tie_points is not None and Path(request.tie_points).suffix.lower() not in (".laz", ".las"):
-        raise InputError(f"TIE_POINTS {request.tie_points} must be LAS or LAZ: give a name that ends in .laz.")
+    if request.tie_points is not None:
+        check_cloud("TIE_POINTS", request.tie_points)
     Survey.open(request.survey)  # before a lock is put into a folder that is none
     with held(request.survey, "orient"):
         survey = Survey.open(request.survey)

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from .adjustment import Adjusted, Control
-from .bundle import POSE
+from .adjusted import Adjusted
+from .cameras import POSE
+from .network import Control
 from .sightings import rows
 
 Array = NDArray[np.float64]

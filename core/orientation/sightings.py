@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import bundle
-from .bundle import POSE, Cameras
+from .cameras import POSE, Cameras
+from .collinearity import project
 
 Array = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ def rows(cameras: Cameras, sighting: Sighting, point: Array, size: int) -> tuple
     for i, (view, xy) in enumerate(zip(sighting.view, sighting.xy, strict=True)):
         c = cameras.camera[view]
         pose = cameras.rotation[view], cameras.centre[view]
-        if not bundle.project(point, *pose, cameras.brown[c], at, one_point, one_pose, one_brown):
+        if not project(point, *pose, cameras.brown[c], at, one_point, one_pose, one_brown):
             continue
         part = slice(2 * i, 2 * i + 2)
         free = cameras.free[c]
@@ -51,10 +52,8 @@ def meet(cameras: Cameras, sighting: Sighting) -> Array:
     first = _straight(cameras, sighting)
     if not np.isfinite(first).all():
         return first
-    points, residuals = bundle.intersect(
-        start, sighting.view, sighting.xy, 1.0 / sighting.sigma**2, first[None], cameras.rotation, cameras.centre, cameras.camera,
-        cameras.brown, cameras.basis, cameras.free, 10,
-    )  # fmt: skip
+    rays = start, sighting.view, sighting.xy
+    points, residuals = bundle.intersect(rays, 1.0 / sighting.sigma**2, first[None], cameras.arrays, 10)
     return np.asarray(points[0] if np.isfinite(residuals).all() else np.full(3, np.nan))
 
 

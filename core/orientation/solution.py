@@ -75,8 +75,9 @@ class Solution:
     not known.
 
     Of an adjustment: ``wrong_marks``; ``notes`` in sentences; ``cameras``; ``pixel_sigma`` of tie points; ``centre_sigma``
-    (views, 3) of projection centres; ``tie_sigma`` (3,), the median of tie points' own in E, N, U; ``predicted`` (n, 3),
-    the sigmas of ``errors`` of check points; and what ``alternatives`` would have given.
+    (views, 3) of projection centres; ``tie_sigma`` of the block's points, in E, N, U of the local frame as ``centre_sigma``;
+    ``single`` names the control points that took part with one mark; ``predicted`` (n, 3), the sigmas of ``errors`` of check
+    points; and what ``alternatives`` would have given.
     """
 
     method: Literal["similarity", "adjustment"]
@@ -102,6 +103,7 @@ class Solution:
     pixel_sigma: float | None = None
     centre_sigma: Array | None = None
     tie_sigma: Array | None = None
+    single: frozenset[str] = frozenset()
     predicted: Array | None = None
     alternatives: tuple[Alternative, ...] = ()
 

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from .adjustment import Adjusted, Control, Network, Positions, adjust
+from .adjusted import Adjusted
+from .adjustment import adjust
+from .network import Control, Network, Positions
 from .reliability import Part, Test, tests
 
 Array = NDArray[np.float64]

@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 from strandline.core.block import Block, View
 from strandline.core.camera import Camera
 from strandline.core.frames import LocalFrame
-from strandline.core.orientation import bundle, interior
+from strandline.core.orientation import interior
 from strandline.core.orientation.adjustedsolution import solve_adjustment
-from strandline.core.orientation.adjustment import Network, Positions, adjust
+from strandline.core.orientation.adjustment import adjust
 from strandline.core.orientation.assembly import Assembly
+from strandline.core.orientation.cameras import Cameras, Rays
 from strandline.core.orientation.control import GroundPoint
 from strandline.core.orientation.gnss import Gnss
 from strandline.core.orientation.marks import Mark
+from strandline.core.orientation.network import Network, Positions
 from strandline.core.orientation.observations import Seen, find_marks
 from strandline.core.orientation.solution import Solution, solve
 from strandline.core.simulation.flight import fly, lens, plan
@@ -54,6 +56,8 @@ class Scene:
     wrong_mark: float = 0.0  # px, of the first control point's first mark
     wrong_gcp: float = 0.0  # m, of the second control point in plan
     wrong_height: float = 0.0  # m, of the second control point
+    single: int = 0  # control points that are marked once, the last ones
+    wrong_single: float = 0.0  # px, of these marks
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,7 @@ class Flown:
     camera: Camera
     true_views: tuple[View, ...]
     true_points: Array  # ground points (n, 3)
+    true_ties: Array  # tie points (p, 3)
     gsd: float
 
     def start(self) -> Solution:
@@ -109,13 +114,13 @@ def flown(scene: Scene, *, calibration: Camera | None = None) -> Flown:
     sigmas = np.tile(scene.gnss if scene.declared else (1.0, 1.5), (len(views), 1))
     gnss = Gnss(np.arange(len(views)), FRAME.to_crs(noisy), sigmas, scene.declared, np.zeros(3))
     assembly = oriented(views, ground, rays, scene, random, calibration)
-    return Flown(scene, assembly, points, gnss, camera, views, laid, gsd)
+    return Flown(scene, assembly, points, gnss, camera, views, laid, ground, gsd)
 
 
 def oriented(
     views: tuple[View, ...],
     ground: Array,
-    rays: bundle.Rays,
+    rays: Rays,
     scene: Scene,
     random: np.random.Generator,
     calibration: Camera | None = None,
@@ -125,7 +130,7 @@ def oriented(
     camera = calibration or Camera("OPENCV", *scene.size, (about, about, scene.size[0] / 2, scene.size[1] / 2, 0, 0, 0, 0))
     known = interior.held() if calibration else interior.free(camera, interior.file_focal(about))
     basis, free = interior.merged({1: known})
-    cameras = bundle.Cameras(
+    cameras = Cameras(
         np.array([v.rotation for v in views]), np.array([v.centre for v in views]), np.zeros(len(views), np.int64),
         camera.brown()[None], basis, free,
     )  # fmt: skip
@@ -165,7 +170,7 @@ def _ground(beach: Beach, scene: Scene, photographs: int, random: np.random.Gene
     return np.column_stack([places, _height(beach, scene, np.clip(places, 0, [scene.length, scene.width]))])
 
 
-def _observe(views: tuple[View, ...], ground: Array, scene: Scene, random: np.random.Generator) -> bundle.Rays:
+def _observe(views: tuple[View, ...], ground: Array, scene: Scene, random: np.random.Generator) -> Rays:
     width, height = scene.size
     points, view_of, xy = [], [], []
     for i, view in enumerate(views):
@@ -180,7 +185,7 @@ def _observe(views: tuple[View, ...], ground: Array, scene: Scene, random: np.ra
     order = np.lexsort((view, point))
     counts = np.bincount(point, minlength=len(ground))
     kept = counts >= 2
-    rays = bundle.Rays(np.concatenate([[0], np.cumsum(counts)]).astype(np.int64), view[order].astype(np.int64), pixel[order])
+    rays = Rays(np.concatenate([[0], np.cumsum(counts)]).astype(np.int64), view[order].astype(np.int64), pixel[order])
     ground_kept = rays.only(kept)
     ground[: kept.sum()] = ground[kept]  # the array that the caller holds, without the points that nothing sees
     ground.resize((int(kept.sum()), 3), refcheck=False)
@@ -210,6 +215,9 @@ def _surveyed(views: tuple[View, ...], laid: Array, scene: Scene, random: np.ran
                     continue
             x, y = pixel + random.standard_normal(2) * scene.mark
             marks.append(Mark(f"P{k}", view.name, float(x), float(y)))
+        if scene.control - scene.single <= k < scene.control:
+            middle = min(marks, key=lambda m: np.hypot(m.x - scene.size[0] / 2, m.y - scene.size[1] / 2))
+            marks = [replace(middle, x=middle.x + scene.wrong_single)]
         if k == 0 and marks and scene.wrong_mark:
             marks[0] = replace(marks[0], x=marks[0].x + scene.wrong_mark)
         made.append(GroundPoint(f"P{k}", given[k], k >= scene.control, *scene.gcp, tuple(marks)))

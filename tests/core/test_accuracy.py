@@ -52,6 +52,19 @@ def test_what_does_not_matter_or_is_not_determined():
     assert doming(line, np.zeros(9), None, 0.01) is None
 
 
+def test_a_bend_that_is_expected_is_no_alarm():
+    """A dome of 30 cm is beyond chance where points err by 4 cm, and not where the block's own sigma of a dome is 20 cm."""
+    rise = np.sum(GRID**2, axis=1) / 100.0
+    alone = doming(GRID, 0.3 * rise, np.full(9, 0.04), 0.0)
+    expected = doming(GRID, 0.3 * rise, np.full(9, 0.04), 0.0, 0.2**2 * np.outer(rise, rise))
+    assert alone.significant
+    assert not expected.significant
+    assert expected.amplitude == alone.amplitude
+    assert expected.sigma == pytest.approx(np.hypot(alone.sigma, 0.2))
+    level = doming(GRID, 0.3 * rise, np.full(9, 0.04), 0.0, np.ones((9, 9)))
+    assert level.sigma == pytest.approx(alone.sigma)  # a level in common is no dome
+
+
 def domes(rise, scatter, count):
     """Yield the test on surveys with such a dome (m at the outermost target), the block fitted to six of the targets.
 

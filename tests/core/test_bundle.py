@@ -5,6 +5,8 @@ import pytest
 from strandline.core.block import View
 from strandline.core.camera import Camera
 from strandline.core.orientation import bundle, interior
+from strandline.core.orientation.cameras import Cameras, Rays, rotations
+from strandline.core.orientation.collinearity import project
 from strandline.core.orientation.evenness import even_choice
 
 CAMERA = Camera("FULL_OPENCV", 1800, 1350, (1650, 1655, 906, 671, -0.06, 0.035, 4e-4, -3e-4, 0.01, 0.02, -0.01, 0.005))
@@ -13,7 +15,7 @@ NADIR = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
 def projected(point, rotation, centre, brown):
     out = np.empty(2), np.empty((2, 3)), np.empty((2, 6)), np.empty((2, 12))
-    assert bundle.project(point, rotation, centre, brown, *out)
+    assert project(point, rotation, centre, brown, *out)
     return out
 
 
@@ -23,7 +25,7 @@ def derivative(function, count, step=1e-6):
 
 @pytest.fixture
 def place():
-    rotation = bundle.rotations(np.array([[0.1, -0.05, 0.3]]))[0] @ NADIR
+    rotation = rotations(np.array([[0.1, -0.05, 0.3]]))[0] @ NADIR
     return np.array([8.0, -5.0, 1.0]), rotation, np.array([1.0, 2.0, 50.0]), CAMERA.brown()
 
 
@@ -42,7 +44,7 @@ def test_derivatives_are_those_of_small_differences(place):
     )
 
     def posed(d):
-        return projected(point, bundle.rotations(d[None, :3])[0] @ rotation, centre + d[3:], brown)[0]
+        return projected(point, rotations(d[None, :3])[0] @ rotation, centre + d[3:], brown)[0]
 
     assert by_pose == pytest.approx(derivative(posed, 6), rel=1e-6, abs=1e-5)
     assert by_brown == pytest.approx(
@@ -53,18 +55,18 @@ def test_derivatives_are_those_of_small_differences(place):
 def test_what_lies_behind_or_beyond_the_fold_is_not_seen(place):
     point, rotation, centre, brown = place
     out = np.empty(2), np.empty((2, 3)), np.empty((2, 6)), np.empty((2, 12))
-    assert not bundle.project(centre + [0.0, 0.0, 5.0], rotation, centre, brown, *out)
+    assert not project(centre + [0.0, 0.0, 5.0], rotation, centre, brown, *out)
     folding = brown.copy()
     folding[4:] = 0.0
     folding[4] = -0.5  # r (1 - r^2 / 2) falls from r = 0.816 on
     level = np.array([0.0, 0.0, 0.0])
-    assert bundle.project(level + [0.8, 0.0, 0.0], NADIR, np.array([0.0, 0.0, 1.0]), folding, *out)
-    assert not bundle.project(level + [0.83, 0.0, 0.0], NADIR, np.array([0.0, 0.0, 1.0]), folding, *out)
+    assert project(level + [0.8, 0.0, 0.0], NADIR, np.array([0.0, 0.0, 1.0]), folding, *out)
+    assert not project(level + [0.83, 0.0, 0.0], NADIR, np.array([0.0, 0.0, 1.0]), folding, *out)
 
 
 def test_rotations_of_any_size():
     vectors = np.array([[0.0, 0.0, 0.0], [1e-8, 0.0, 0.0], [0.0, 0.0, np.pi / 2], [0.4, -2.0, 1.0]])
-    made = bundle.rotations(vectors)
+    made = rotations(vectors)
     assert made[2] == pytest.approx(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), abs=1e-12)
     assert made @ made.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(3), (4, 1, 1)), abs=1e-12)
 
@@ -74,7 +76,7 @@ def small():
     """Four views of two cameras, nine points, all seen by all but for a few."""
     rng = np.random.default_rng(1)
     centres = np.array([[0, 0, 30.0], [6, 0, 31.0], [0, 6, 29.5], [6, 6, 30.2]])
-    turns = bundle.rotations(rng.normal(size=(4, 3)) * 0.05) @ NADIR
+    turns = rotations(rng.normal(size=(4, 3)) * 0.05) @ NADIR
     camera = np.array([0, 0, 1, 1])
     cameras = [
         Camera("OPENCV", 1800, 1350, (1650, 1655, 906, 671, -0.06, 0.035, 4e-4, -3e-4)),
@@ -82,7 +84,7 @@ def small():
     ]
     basis, free = interior.merged({i: interior.free(c, None) for i, c in enumerate(cameras)})
     brown = np.array([c.brown() for c in cameras])
-    made = bundle.Cameras(turns, centres, camera, brown, basis, free)
+    made = Cameras(turns, centres, camera, brown, basis, free)
     points = np.column_stack([rng.uniform(-2, 8, (9, 2)), rng.uniform(-1, 1, 9)])
     seen = [[v for v in range(4) if (p + v) % 4] for p in range(9)]
     start = np.concatenate([[0], np.cumsum([len(s) for s in seen])])
@@ -90,7 +92,7 @@ def small():
     xy = []
     for p, views in enumerate(seen):
         xy += [projected(points[p], turns[v], centres[v], brown[camera[v]])[0] + rng.normal(size=2) * 0.3 for v in views]
-    return made, bundle.Rays(start.astype(np.int64), view.astype(np.int64), np.array(xy)), points
+    return made, Rays(start.astype(np.int64), view.astype(np.int64), np.array(xy)), points
 
 
 def dense(cameras, rays, points, weight):
@@ -110,10 +112,7 @@ def dense(cameras, rays, points, weight):
 
 
 def arguments(cameras, rays, points, weight):
-    return (
-        rays.start, rays.view, rays.xy, weight, points, cameras.rotation, cameras.centre, cameras.camera, cameras.brown,
-        cameras.basis, cameras.free,
-    )  # fmt: skip
+    return rays.arrays, weight, points, cameras.arrays
 
 
 def test_reduced_equations_are_schurs_complement(small):
@@ -151,6 +150,8 @@ def test_points_follow_and_their_covariance_is_the_whole_ones(small):
     for p in range(len(points)):
         part = slice(n + 3 * p, n + 3 * p + 3)
         assert got[p] == pytest.approx(whole[part, part], rel=1e-6, abs=1e-12)
+    alike = bundle.covariances(*arguments(cameras, rays, points, weight), cameras.interior_column, whole[:n, :n])
+    assert alike == pytest.approx(got, rel=1e-9, abs=1e-14)
     moved = bundle.follow(*arguments(cameras, rays, points, weight), cameras.interior_column, solved[:n])
     assert (moved - points).ravel() == pytest.approx(solved[n:], rel=1e-6, abs=1e-9)
 
@@ -161,7 +162,7 @@ def test_intersection_finds_the_point_again(small):
         projected(points[p], cameras.rotation[v], cameras.centre[v], cameras.brown[cameras.camera[v]])[0]
         for p, v in zip(rays.point, rays.view, strict=True)
     ])  # fmt: skip
-    rays = bundle.Rays(rays.start, rays.view, exact)
+    rays = Rays(rays.start, rays.view, exact)
     found, left = bundle.intersect(*arguments(cameras, rays, points + 0.5, np.ones(len(rays.view))), 8)
     assert found == pytest.approx(points, abs=1e-8)
     assert np.abs(left).max() < 1e-7
@@ -179,7 +180,7 @@ def tracks(*seen):
     """Return the rays of points given as {view: (x, y)}."""
     start = np.concatenate([[0], np.cumsum([len(s) for s in seen])]).astype(np.int64)
     view = np.array([v for s in seen for v in s], np.int64)
-    return bundle.Rays(start, view, np.array([xy for s in seen for xy in s.values()], float))
+    return Rays(start, view, np.array([xy for s in seen for xy in s.values()], float))
 
 
 def test_an_even_choice_takes_long_tracks_and_leaves_no_patch_empty():
