@@ -28,8 +28,8 @@ class Sand:
 class Crossing:
     """The most seaward place where the profile falls through the datum.
 
-    Its distance (m), the slope there (height per metre seaward, over the scale asked for), the weights (n,) of the nodes' heights in
-    the height at that place, and how many such places the profile has.
+    Its distance (m), the slope there (height per metre seaward, over the scale asked for), the weights (n,) of the nodes'
+    heights in the height at that place, and how many such places the profile has.
     """
 
     distance: float

@@ -95,8 +95,8 @@ def date_models(
         name = Path(source.path).name
         if one.date in seen:
             raise InputError(
-                f"{seen[one.date]} and {name} have the same date, {written(one.date)}: leave one out, or tell them apart in DATES "
-                "by a time (2018-06-06T09:30)."
+                f"{seen[one.date]} and {name} have the same date, {written(one.date)}: leave one out, or tell them apart in "
+                "DATES by a time (2018-06-06T09:30)."
             )
         seen[one.date] = name
     return known

@@ -1,14 +1,15 @@
 """How each model of a series errs by itself, so that any difference, sum or trend of them can be given its sigma.
 
 A difference of dates has the errors of both, and two differences that share a date share its error: so errors are kept per
-date, where they are independent. Stable ground shows each date's departure r_k = z_k - mean z of the dates. What is taken off is a
-linear function of it, and the same function for all dates; the error of the mean drops out of all differences then, and what
+date, where they are independent. Stable ground shows each date's departure r_k = z_k - mean z of the dates. What is taken off is
+a linear function of it, and the same function for all dates; the error of the mean drops out of all differences then, and what
 remains of a date with the prior covariance P (of the terms of ``terms``; from its georeferencing, else none) is
 
     (I - B A) P (I - B A)' + B N B',    B the fitted terms, A = (T B)^+ T their fit to the terms T on stable ground,
 
-N the fit's covariance under the variogram of what is left. The scatter of r_k holds (1 - 2/n) of the date's own variance and 1/n^2
-of all: solved for the own (for two dates both are taken to be alike).
+N the fit's covariance under the variogram of what is left. The scatter of r_k holds (1 - 2/n) of the date's own variance and
+1/n^2 of all: solved for the own (for two dates both are taken to be alike). How errors fade with
+distance is pooled over the dates.
 """
 
 from __future__ import annotations
@@ -76,7 +77,10 @@ class EpochError:
 
 @dataclass(frozen=True)
 class Ground:
-    """A random sample of the ``count`` cells of stable ground with a height at all dates (n, dates); ``patches`` keep neighbours."""
+    """A random sample of the ``count`` cells of stable ground with a height at all dates.
+
+    Heights and sigmas are (n, dates); ``patches`` keep neighbours.
+    """
 
     row: NDArray[np.int64]
     column: NDArray[np.int64]
@@ -220,29 +224,35 @@ def _noise(series: Series, ground: Ground, terms: Array, fits: Array, request: S
     steps = (series.grid.step_north, series.grid.cell)
     place = np.column_stack([ground.x, ground.y])[:SAMPLE]
     extent = float(np.hypot(np.ptp(ground.x), np.ptp(ground.y)))
-    noises, unresolved = [], False
+    noises = []
+    shape = _pooled(
+        [
+            fit_variogram(cells.row, cells.column, patch_left[:, k] / np.maximum(mixed[:, k], 1e-6), steps)
+            for k in range(len(series.epochs))
+        ]
+    )
+    if shape is not None and np.isinf(shape.reach):
+        if request.correlation_range is None and count == 1:
+            progress.warn(
+                "STABLE is too small to resolve the range of the correlated error: its unresolved part is taken to be alike "
+                "in all cells, which is a bound; draw larger stable areas, or give CORRELATION_RANGE."
+            )
+        told = tuple((s, request.correlation_range or r if np.isinf(r) else r) for s, r in shape.structures)
+        shape = replace(shape, structures=told)
+    design = terms[:SAMPLE, : 3 if _carries_plane(terms, max(steps)) else 1]
     for k, epoch in enumerate(series.epochs):
-        variogram = fit_variogram(cells.row, cells.column, patch_left[:, k] / np.maximum(mixed[:, k], 1e-6), steps)
         square = float(np.mean(sigma[:, k] ** 2))
-        if variogram is None:
+        if shape is None:
             # Too few cells to tell noise from what they share: they count as one.
-            model = _given_model(request.correlation_range, True)
-            whole = Variogram(0.0, ((1.0, np.inf),))
+            model, whole = _given_model(request.correlation_range, True), Variogram(0.0, ((1.0, np.inf),))
         else:
+            whole = shape
             if epoch.sigma is None:
-                # The sigma is an estimate that is not too small; so must be what it is divided into.
-                much = max(1.0, 1.0 / max(variogram.nugget + variogram.sill, 1e-6))
-                told = tuple((much * s, r) for s, r in variogram.structures)
-                variogram = replace(variogram, nugget=much * variogram.nugget, structures=told)
-            structures = variogram.structures
-            if np.isinf(variogram.reach):
-                unresolved = unresolved or request.correlation_range is None
-                structures = tuple((s, request.correlation_range or r if np.isinf(r) else r) for s, r in structures)
-            model = ErrorModel(float(np.sqrt(variogram.nugget)), tuple((float(np.sqrt(s)), r) for s, r in structures))
-            whole = variogram
-        carried = 3 if _carries_plane(terms, max(steps)) else 1
+                # The sigma is an estimate of the whole; so must be what it is divided into.
+                much = 1.0 / max(shape.nugget + shape.sill, 1e-6)
+                whole = replace(shape, nugget=much * shape.nugget, structures=tuple((much * s, r) for s, r in shape.structures))
+            model = ErrorModel(float(np.sqrt(whole.nugget)), tuple((float(np.sqrt(s)), r) for s, r in whole.structures))
         ranges = tuple((s * square, extent if np.isinf(r) else r) for s, r in whole.structures)
-        design = terms[:SAMPLE, :carried]
         covariance = fit_covariance(design, place, max(_EXACT, whole.nugget * square), ranges, ground.count)
         for s, r in whole.structures:
             if np.isinf(r):  # all cells may err alike, or tilt most over the extent of stable ground: both are counted
@@ -251,12 +261,26 @@ def _noise(series: Series, ground: Ground, terms: Array, fits: Array, request: S
         samples = square * (whole.nugget + whole.sill) / max(float(covariance[0, 0]), _EXACT)
         common = float(np.sqrt(own[k])) if epoch.sigma is None else None
         noises.append(_Noise(float(np.sqrt(scatter[k])), common, model, covariance, samples))
-    if unresolved and count == 1:
-        progress.warn(
-            "STABLE is too small to resolve the range of the correlated error: its unresolved part is taken to be alike in all "
-            "cells, which is a bound; draw larger stable areas, or give CORRELATION_RANGE."
-        )
     return noises
+
+
+def _pooled(variograms: list[Variogram | None]) -> Variogram | None:
+    """Return the mean of the dates' variograms as a nugget, one sill with the mean range, and what is not resolved.
+
+    Dates of one place err alike over distance, each to its own extent; a few patches cannot tell more for each of them.
+    """
+    found = [v for v in variograms if v is not None]
+    if not found:
+        return None
+    structures = [structure for v in found for structure in v.structures]
+    near = [(s, r) for s, r in structures if np.isfinite(r)]
+    told = []
+    if near:
+        sill = sum(s for s, _ in near)
+        told.append((sill / len(found), sum(s * r for s, r in near) / sill))
+    if far := sum(s for s, r in structures if np.isinf(r)):
+        told.append((far / len(found), np.inf))
+    return Variogram(float(np.mean([v.nugget for v in found])), tuple(told))
 
 
 def own_variances(scatter: Array) -> Array:

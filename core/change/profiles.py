@@ -14,6 +14,7 @@ from ..contract import VectorSource
 from ..errors import InputError, NotEnoughData
 from ..progress import SILENT, Progress
 from ..vector import check_destination, write_layer
+from .alignment import Aligned
 from .crosssection import Crossing, Sand, sand_above, seaward_crossing, together
 from .epocherror import EpochError, epoch_errors, stable_ground
 from .heard import Heard
@@ -183,9 +184,9 @@ def _section(
 
 def _cell_sigmas(epoch: Epoch, error: EpochError, crs: str, transect: Transect, distance: Array, spacing: float) -> Array:
     """Return the sigma of a cell at each node (n,); NaN where it is not known."""
-    if not hasattr(epoch.sigma, "heights"):
+    if not isinstance(epoch.sigma, Aligned):
         value = error.common if epoch.sigma is None else epoch.sigma
-        return np.full(len(distance), np.nan if value is None else float(value))  # type: ignore[arg-type]
+        return np.full(len(distance), np.nan if value is None else value)
     sigma = sample_line(epoch.sigma.heights, crs, transect, distance, spacing).height
     sigma[~(sigma > 0)] = np.nan
     return sigma
@@ -207,7 +208,9 @@ def change_between(request: Request, before: Section, after: Section, errors: tu
 
 def mean_change(request: Request, sections: list[list[Section]], errors: list[EpochError], first: int, last: int) -> Change:
     """Return the mean change over all transects that both dates cover; transects near one another err alike, which is counted."""
-    kept, volumes, weights = [], [], ([], [])  # type: ignore[var-annotated]
+    kept: list[tuple[Line, Line]] = []
+    volumes: list[float] = []
+    weights: tuple[list[Array], list[Array]] = ([], [])
     for row in sections:
         before, after = row[first], row[last]
         distance = before.line.distance

@@ -72,9 +72,10 @@ def write_report(path: str, f: ProfileFindings) -> None:
     )  # fmt: skip
     report.text(
         f"Sand above DATUM {f.request.datum:g} m per metre of beach, from {f.request.start:g} m to "
-        f"{'the end' if f.request.end is None else f'{f.request.end:g} m'} of each transect, points every {f.spacing:.3g} m. Gaps are "
-        "not filled: a volume is that of the share covered, and a change is taken over what both dates cover. Width: from START "
-        f"to the most seaward fall through DATUM; its sigma is that of the height by the slope over {f.scale:.3g} m."
+        f"{'the end' if f.request.end is None else f'{f.request.end:g} m'} of each transect, points every {f.spacing:.3g} m. "
+        "Gaps are not filled: a volume is that of the share covered, and a change is taken over what both dates cover. "
+        "Width: from START to the most seaward fall through DATUM; its sigma is that of the height by the slope over "
+        f"{f.scale:.3g} m."
     )
     seen = [
         (transect, row)
@@ -82,8 +83,8 @@ def write_report(path: str, f: ProfileFindings) -> None:
         if any(np.isfinite(section.line.height).any() for section in row)
     ]
     report.text(
-        f"Charts of {min(len(seen), _CHARTS)} transects, bands of {percent}; {len(f.transects) - len(seen)} have no height at any date"
-        + (f", {len(seen) - _CHARTS} are not drawn here (POINTS holds all)." if len(seen) > _CHARTS else ".")
+        f"Charts of {min(len(seen), _CHARTS)} transects, bands of {percent}; {len(f.transects) - len(seen)} have no height "
+        "at any date" + (f", {len(seen) - _CHARTS} are not drawn here (POINTS holds all)." if len(seen) > _CHARTS else ".")
     )
     for transect, row in seen[:_CHARTS]:
         report.figure(_chart(f, row), f"Transect {transect.name}.")

@@ -55,7 +55,7 @@ class SeriesRequest:
 
 @dataclass(frozen=True)
 class Epoch:
-    """One model: when it was flown, what says so, its heights as they are and on the grid, the sigma of a cell (None: not known)."""
+    """One model: when it was flown, what says so, its heights as they are and on the grid, a cell's sigma (None: not known)."""
 
     date: datetime
     told_by: str
@@ -168,8 +168,8 @@ def open_series(request: SeriesRequest, files: ExitStack, progress: Progress, *,
     for model in models:
         if (accuracy := link_accuracy(models[0], model)) > _LINK:
             progress.warn(
-                f"The datums of {models[0].label} and {model.label} are linked to {accuracy:g} m only: one may lie that far beside "
-                "the other; put both in the CRS in which they were surveyed."
+                f"The datums of {models[0].label} and {model.label} are linked to {accuracy:g} m only: one may lie that far "
+                "beside the other; put both in the CRS in which they were surveyed."
             )
     west, south, east, north = grid.bounds
     _, areas = true_area(grid.crs, (west + east) / 2, (south + north) / 2)
@@ -216,8 +216,8 @@ def _same_date(precision: RasterSource, source: RasterSource, dated: Dated) -> N
     dates = date_in_name(Path(precision.path).stem)
     if len(dates) == 1 and next(iter(dates)).date() != dated.date.date():
         raise InputError(
-            f"PRECISIONS: {Path(precision.path).name} stands where {Path(source.path).name} of {written(dated.date)} stands in DSMS: "
-            "give both in the same order."
+            f"PRECISIONS: {Path(precision.path).name} stands where {Path(source.path).name} of {written(dated.date)} stands "
+            "in DSMS: give both in the same order."
         )
 
 

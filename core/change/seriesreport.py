@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..report.html import Report
+from .alignment import Aligned
 from .epocherror import EpochError
 from .series import Series
 from .uncertainty import Fitted, Given
@@ -24,9 +25,8 @@ def dates_told(report: Report, series: Series, errors: list[EpochError], stable:
     report.heading("Dates and errors")
     rows = []
     for epoch, error in zip(series.epochs, errors, strict=True):
-        given = (
-            "precision raster" if hasattr(epoch.sigma, "heights") else epoch.sigma if epoch.sigma is not None else error.common
-        )
+        number = error.common if epoch.sigma is None else epoch.sigma
+        given = "precision raster" if isinstance(epoch.sigma, Aligned) else number
         m = error.model
         split = None
         if m.random is not None:

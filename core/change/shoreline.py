@@ -132,7 +132,8 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             shores.append(_measured(series, epoch, error, lines, removed, scale))
         if not any(shore.lines for shore in shores):
             raise NotEnoughData(
-                f"No shoreline at DATUM={request.datum:g} m is as long as MIN_LENGTH={request.min_length:g} m: give a smaller one."
+                f"No shoreline at DATUM={request.datum:g} m is as long as MIN_LENGTH={request.min_length:g} m: give a "
+                "smaller one."
             )
         factor = coverage_factor(request.confidence)
         positions = [
@@ -314,8 +315,8 @@ def _tell(
     landward = [t.name for t, row in zip(transects, positions, strict=True) if any(p and p.slope and p.slope > 0 for p in row)]
     if transects and 2 * len(landward) > len(transects):
         progress.warn(
-            f"At {len(landward)} of {len(transects)} transects the ground rises seaward: if they were drawn from the sea to the land, "
-            "set FLIP."
+            f"At {len(landward)} of {len(transects)} transects the ground rises seaward: if they were drawn from the sea to "
+            "the land, set FLIP."
         )
     cells = max(series.grid.cell, series.grid.step_north)
     for epoch, shore in zip(series.epochs, shores, strict=True):

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 class Moves:
     """Seaward positive; metres and metres per year; None: not known.
 
-    NSM, net shoreline movement from the oldest to the youngest position; SCE, the largest distance between any two; EPR, end point
-    rate, NSM by the years between; LRR, linear regression rate, all dates alike; WLR, weighted by 1 / sigma^2. Each interval is
-    that of CONFIDENCE.
+    NSM, net shoreline movement from the oldest to the youngest position; SCE, the largest distance between any two; EPR, end
+    point rate, NSM by the years between; LRR, linear regression rate, all dates alike; WLR, weighted by 1 / sigma^2. Each
+    interval is that of CONFIDENCE.
     """
 
     count: int

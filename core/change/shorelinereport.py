@@ -45,7 +45,8 @@ def verdict(f: ShorelineFindings) -> str:
     if tested:
         out = sum(m.nsm > m.factor * m.nsm_sigma for m in tested if m.nsm is not None and m.nsm_sigma is not None)
         back = sum(-m.nsm > m.factor * m.nsm_sigma for m in tested if m.nsm is not None and m.nsm_sigma is not None)
-        told += f"; at {100 * f.request.confidence:g} % {out} advanced, {back} retreated and {len(tested) - out - back} show no change"
+        still = len(tested) - out - back
+        told += f"; at {100 * f.request.confidence:g} % {out} advanced, {back} retreated and {still} show no change"
     return told + " (seaward is positive)."
 
 
@@ -80,9 +81,10 @@ def write_report(path: str, f: ShorelineFindings) -> None:
         ],
     )
     report.text(
-        f"The sigma across the shore is that of the height by the slope, of a robust plane over {f.scale:.3g} m; medians along the "
-        f"line. Pieces shorter than {f.request.min_length:g} m are left out (KEEP={f.request.keep}). No line is drawn through gaps. "
-        "A surface model of a beach shows dry and wet sand alike: DATUM must lie above the water of every date."
+        f"The sigma across the shore is that of the height by the slope, of a robust plane over {f.scale:.3g} m; medians "
+        f"along the line. Pieces shorter than {f.request.min_length:g} m are left out (KEEP={f.request.keep}). No line is "
+        "drawn through gaps. A surface model of a beach shows dry and wet sand alike: DATUM must lie above the water of "
+        "every date."
     )
     if f.transects:
         _moves(report, f)
@@ -106,10 +108,11 @@ def _moves(report: Report, f: ShorelineFindings) -> None:
         ],
     )  # fmt: skip
     report.text(
-        "NSM: net shoreline movement, youngest minus oldest position. SCE: shoreline change envelope, the largest distance between "
-        "any two. EPR: end point rate, NSM by the years between. LRR: linear regression rate, all dates alike. WLR: weighted by "
-        "1 / sigma^2. Rates need three positions. Their intervals are the wider of what the sigmas of the positions and what the "
-        "scatter about the line (with Student's quantile, which is wide for few dates) tell. A dash: not known."
+        "NSM: net shoreline movement, youngest minus oldest position. SCE: shoreline change envelope, the largest distance "
+        "between any two. EPR: end point rate, NSM by the years between. LRR: linear regression rate, all dates alike. WLR: "
+        "weighted by 1 / sigma^2. Rates need three positions. Their intervals are the wider of what the sigmas of the "
+        "positions and what the scatter about the line (with Student's quantile, which is wide for few dates) tell. A dash: "
+        "not known."
     )
 
 
@@ -142,7 +145,7 @@ def _along(f: ShorelineFindings) -> Any:
         m = f.moves[i]
         half = None if m.nsm_sigma is None else m.factor * m.nsm_sigma
         colour = "#888888" if half is None or m.nsm is None or abs(m.nsm) <= half else "#2166ac" if m.nsm > 0 else "#b2182b"
-        axes.errorbar(i, m.nsm, yerr=half, fmt="o", color=colour, markersize=4, linewidth=1.0)
+        axes.errorbar(i, float(m.nsm or 0.0), yerr=half, fmt="o", color=colour, markersize=4, linewidth=1.0)
     axes.axhline(0.0, color="black", linewidth=0.8)
     step = max(1, len(f.transects) // 20)
     axes.set(xlabel="transect", ylabel="NSM (m)")
@@ -153,7 +156,7 @@ def _along(f: ShorelineFindings) -> Any:
 def _series(f: ShorelineFindings) -> Any:
     figure = new_figure(9.0, 3.2)
     axes = figure.add_subplot()
-    dates = [epoch.date for epoch in f.series.epochs]
+    dates: Any = [epoch.date for epoch in f.series.epochs]
     table = np.full((len(f.positions), len(dates)), np.nan)
     for i, row in enumerate(f.positions):
         first = next((p.distance for p in row if p is not None), None)

@@ -16,6 +16,7 @@ from ..progress import SILENT, Progress
 from ..raster import CogWriter, Grid, Patch
 from ..raster import check_destination as check_raster
 from ..vector import check_destination, write_layer
+from .alignment import footprint
 from .epocherror import EpochError, epoch_errors, stable_ground
 from .heard import Heard
 from .series import Series, SeriesRequest, covered_by, open_series, validate
@@ -90,11 +91,10 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
                 raise InputError(f"RATE and SIGNIFICANT need {LEAST} dates and DSMS holds {dates}: add surface models.")
             progress.warn(f"Rates need {LEAST} dates; there are {dates}: they are not known.")
         covered = covered_by(series)
-        zones = (
-            read_zones(request.zones, "ZONES", request.zone_field, grid.crs)
-            if request.zones
-            else [Zone("all dates", _overlap(series))]
-        )
+        if request.zones:
+            zones = read_zones(request.zones, "ZONES", request.zone_field, grid.crs)
+        else:
+            zones = [Zone("all dates", _overlap(series))]
         if not any(shapely.intersects(zone.shape, covered) for zone in zones):
             raise InputError("No zone of ZONES lies on the DSMs: draw zones there, and check the layer's CRS.")
         ground = None
@@ -153,8 +153,6 @@ def _validate(request: Request) -> None:
 
 def _overlap(series: Series) -> Any:
     """Return the ground that every model's raster covers."""
-    from .alignment import footprint
-
     shape = shapely.intersection_all([footprint(epoch.heights, series.grid.crs) for epoch in series.epochs])
     if shapely.area(shape) < series.grid.cell_area:
         raise InputError("There is no place that all DSMs cover: give ZONES, or leave a DSM out.")
@@ -171,9 +169,9 @@ def _pass(request: Request, series: Series, errors: list[EpochError], tallies: l
     wanted = dates >= LEAST and bool(request.rate or request.significant or request.output_html_file)
     seen = np.zeros(dates, np.int64)
     with ExitStack() as files:
-        rate_file = files.enter_context(_writer(request.rate, grid, "rate", series)) if request.rate else None
-        kept_file = (
-            files.enter_context(_writer(request.significant, grid, "significant rate", series)) if request.significant else None
+        rate_file, kept_file = (
+            files.enter_context(_writer(path, grid, name, series)) if path else None
+            for path, name in ((request.rate, "rate"), (request.significant, "significant rate"))
         )
         for column, row, width, height in progress.over(series.tiles()):
             window = grid.window(column, row, width, height)
@@ -240,11 +238,11 @@ def _tell(series: Series, zones: list[ZoneSeries], total: ZoneSeries, progress: 
         raise NotEnoughData(f"No cell of the zones has a height at every date{told}: leave dates out, or choose other zones.")
     if empty:
         progress.warn(f"No cell of {', '.join(empty)} has a height at every date: their volumes are not known.")
-    worst = int(np.argmax(total.without))
-    if total.without[worst] - total.covered_percent > _POOR:
+    costly = int(np.argmax(total.without))
+    if total.without[costly] - total.covered_percent > _POOR:
         progress.warn(
-            f"{total.covered_percent:.0f} % of the zones have a height at every date, which is the ground that is summed; without "
-            f"{series.epochs[worst].name} it would be {total.without[worst]:.0f} %."
+            f"{total.covered_percent:.0f} % of the zones have a height at every date, which is the ground that is summed; "
+            f"without {series.epochs[costly].name} it would be {total.without[costly]:.0f} %."
         )
     if not np.isfinite(total.sigmas).all():
         progress.warn(

@@ -69,8 +69,8 @@ def write_report(path: str, f: SeriesFindings) -> None:
         report.text(f"Curves of the first {_CURVES} of {len(f.zones)} zones; the table holds all.")
     rows = [row for zone in (f.zones if len(f.zones) == 1 else [f.total, *f.zones]) for row in rows_of(f.series, zone, factor)]
     report.table(
-        ["zone", "date", "net since first (m3)", "sigma", f"low ({percent})", "high", "erosion", "deposition", "net since previous (m3)",
-         "sigma", f"low ({percent})", "high", "erosion", "deposition", "covered %"],
+        ["zone", "date", "net since first (m3)", "sigma", f"low ({percent})", "high", "erosion", "deposition",
+         "net since previous (m3)", "sigma", f"low ({percent})", "high", "erosion", "deposition", "covered %"],
         [
             [row[key] for key in (
                 "zone", "date", "net", "sigma", "low", "high", "erosion", "deposition", "net_previous", "sigma_previous",
@@ -80,20 +80,20 @@ def write_report(path: str, f: SeriesFindings) -> None:
         ],
     )  # fmt: skip
     report.text(
-        "Volumes are of the ground that has a height at every date, so that changes add up. Consecutive changes share a date and its "
-        "error: their sigmas must not be added, neither plainly nor in quadrature; the change since the first date has its own. "
-        "Erosion and deposition add up noise as well as change: quote the net."
+        "Volumes are of the ground that has a height at every date, so that changes add up. Consecutive changes share a "
+        "date and its error: their sigmas must not be added, neither plainly nor in quadrature; the change since the first "
+        "date has its own. Erosion and deposition add up noise as well as change: quote the net."
     )
     report.heading("Rates")
     if f.map.cells:
         report.figure(
             _map(f),
-            f"Rate of each cell with heights at {LEAST} dates or more; strong colours: significant at {percent}. Red: falling, blue: "
-            "rising. Outlines: zones.",
+            f"Rate of each cell with heights at {LEAST} dates or more; strong colours: significant at {percent}. Red: "
+            "falling, blue: rising. Outlines: zones.",
         )
         report.text(
-            f"{f.map.cells:,} cells have a rate; {f.map.rising:,} rise and {f.map.falling:,} fall significantly. Where nothing moved "
-            f"about {100 * (1 - f.request.confidence):.2g} % would by chance."
+            f"{f.map.cells:,} cells have a rate; {f.map.rising:,} rise and {f.map.falling:,} fall significantly. Where "
+            f"nothing moved about {100 * (1 - f.request.confidence):.2g} % would by chance."
         )
     columns = [rate_columns(zone) for zone in f.zones]
     report.table(
@@ -137,18 +137,18 @@ def write_report(path: str, f: SeriesFindings) -> None:
 def _curve(f: SeriesFindings, zone: ZoneSeries) -> Any:
     figure = new_figure(8.0, 2.8)
     axes = figure.add_subplot()
-    dates = [epoch.date for epoch in f.series.epochs]
-    half = np.array([0.0] + [zone.change(0, k)[1] for k in range(1, len(dates))]) * coverage_factor(f.request.confidence)
+    days: Any = [epoch.date for epoch in f.series.epochs]
+    half = np.array([0.0] + [zone.change(0, k)[1] for k in range(1, len(days))]) * coverage_factor(f.request.confidence)
     axes.errorbar(
-        dates, zone.net, yerr=np.where(np.isfinite(half), half, 0.0), fmt="o-", color="#2a6f97", capsize=3, linewidth=1.4
+        days, zone.net, yerr=np.where(np.isfinite(half), half, 0.0), fmt="o-", color="#2a6f97", capsize=3, linewidth=1.4
     )
     trend = zone.trend
     if np.isfinite(trend.rate):
         sigmas = zone.sigmas
-        weight = 1.0 / sigmas**2 if np.isfinite(sigmas).all() and (sigmas > 0).all() else np.ones(len(dates))
+        weight = 1.0 / sigmas**2 if np.isfinite(sigmas).all() and (sigmas > 0).all() else np.ones(len(days))
         years = f.series.years
         mean_year, mean_net = np.average(years, weights=weight), np.average(zone.net, weights=weight)
-        axes.plot(dates, mean_net + float(trend.rate) * (years - mean_year), "--", color="#8a7a55", linewidth=1.0)
+        axes.plot(days, mean_net + float(trend.rate) * (years - mean_year), "--", color="#8a7a55", linewidth=1.0)
     axes.axhline(0.0, color="black", linewidth=0.8)
     axes.set(xlabel="date", ylabel="net since first (m3)", title=zone.zone.name)
     axes.tick_params(labelsize=8)

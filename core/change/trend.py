@@ -2,8 +2,8 @@
 
 Weighted least squares with weights 1 / sigma^2 (WLR of the shoreline literature; Thieler et al. 2009), or all alike where a sigma
 is not known (LRR). Errors of measurement give the rate the sigma 1 / sqrt(S), S = sum w (t - mean t)^2; but a coast does not
-move on a line, so that the scatter about it gives another, sqrt(chi^2 / (n - 2) / S), which is to be taken with Student's quantile.
-The interval is the wider of both.
+move on a line, so that the scatter about it gives another, sqrt(chi^2 / (n - 2) / S), which is to be taken with Student's
+quantile. The interval is the wider of both.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ LEAST = 3  # dates
 
 @dataclass(frozen=True)
 class Trend:
-    """Per series (...): rate per year, its sigma, half the width of its interval, and the number of values; NaN: not determined."""
+    """Per series (...): rate per year, its sigma, half the width of its interval, number of values; NaN: not determined."""
 
     rate: Array
     sigma: Array
@@ -38,8 +38,8 @@ class Trend:
 def fit_trend(years: Array, values: Array, sigma: Array | None, confidence: float) -> Trend:
     """Return the trends of ``values`` (n, ...) at ``years`` (n,); NaN values do not count.
 
-    ``sigma`` (n, ...) are of independent errors; None or NaN: not known, and then all dates of that series weigh alike and only the
-    scatter tells.
+    ``sigma`` (n, ...) are of independent errors; None or NaN: not known, and then all dates of that series weigh alike and
+    only the scatter tells.
     """
     known = np.isfinite(values)
     count = known.sum(axis=0)
