@@ -183,6 +183,24 @@ def _dated_lines(layer: QgsVectorLayer) -> None:
     _by_date(layer, lambda colour: QgsLineSymbol.createSimple({"color": colour, "width": "0.6"}))
 
 
+def _heights(layer: QgsVectorLayer) -> None:
+    """Draw points in the colours of a terrain by their height: points of several dates lie one on the other."""
+    place = layer.fields().lookupField("height")
+    if place < 0:
+        return
+    values = sorted(v[0] for v in _pairs(layer, [place]))
+    if not values:
+        return
+    count = len(_TERRAIN)
+    bounds = [values[round(i / count * (len(values) - 1))] for i in range(count + 1)]
+    shape = {"name": "circle", "size": "1.6", "outline_style": "no"}
+    ranges = []
+    for i, colour in enumerate(_TERRAIN):
+        symbol = QgsMarkerSymbol.createSimple({**shape, "color": colour})
+        ranges.append(QgsRendererRange(bounds[i], bounds[i + 1], symbol, f"{bounds[i]:.2f} to {bounds[i + 1]:.2f} m"))
+    layer.setRenderer(QgsGraduatedSymbolRenderer("height", ranges))
+
+
 def _dated_points(layer: QgsVectorLayer) -> None:
     """Draw points in the colours of their dates."""
     shape = {"name": "circle", "size": "1.6", "outline_style": "no"}
@@ -238,7 +256,7 @@ DIFFERENCE = Style(_difference)
 RESIDUALS = Style(_arrows)
 ZONES = Style(_zones)
 PROFILES = Style(_profiles)
-PROFILE_POINTS = Style(_dated_points)
+PROFILE_POINTS = Style(_heights)
 SHORELINES = Style(_dated_lines)
 SHORE_POSITIONS = Style(_dated_points)
 SHORE_RATES = Style(_rates)

@@ -163,18 +163,23 @@ def epoch_errors(
     fits = {1: _fit(terms, apart, 1)}
     if _carries_plane(terms, max(series.grid.cell, series.grid.step_north)):
         fits[3] = _fit(terms, apart, 3)
-    told = {count: _noise(series, ground, terms, fit, request, progress) for count, fit in fits.items()}
     count = 3 if request.coregister == "plane" else 1
     if count not in fits:
         raise NotEnoughData("STABLE lies on one line, which leaves a plane free to tilt about it: add stable ground beside it.")
-    if request.coregister in ("auto", "none") and 3 in fits and _tilted(fits[3], told[1]):
+    noises = _noise(series, ground, terms, fits[count], request)
+    if request.coregister in ("auto", "none") and 3 in fits and _tilted(fits[3], noises):
         count = 3
         progress.info("STABLE shows a tilt of one date against the others that chance does not explain: planes are fitted.")
-    noises = told[count]
+        noises = _noise(series, ground, terms, fits[count], request)
+    if request.correlation_range is None and any(np.isinf(r) for noise in noises for _, r in noise.model.structures or ()):
+        progress.warn(
+            "STABLE is too small to resolve the range of the correlated error: its unresolved part is taken to be alike in all "
+            "cells, which is a bound; draw larger stable areas, or give CORRELATION_RANGE."
+        )
     basis = np.eye(COUNT)[:, :count]
     alias = np.linalg.lstsq(terms[:, :count], terms, rcond=None)[0]
     rest = np.eye(COUNT) - basis @ alias
-    free = count == 1 and all(p is None for p in priors) and _tilt_matters(told, centre, places)
+    free = count == 1 and all(p is None for p in priors) and _tilt_matters(noises, centre, places)
     if free:
         progress.warn(
             "STABLE does not reach far enough to tell a tilt of one date against another where it is asked for: that tilt is not "
@@ -210,7 +215,7 @@ def _fit(terms: Array, apart: Array, count: int) -> Array:
     return np.array([robust_fit(terms[:, :count], apart[:, k]) for k in range(apart.shape[1])])
 
 
-def _noise(series: Series, ground: Ground, terms: Array, fits: Array, request: SeriesRequest, progress: Progress) -> list[_Noise]:
+def _noise(series: Series, ground: Ground, terms: Array, fits: Array, request: SeriesRequest) -> list[_Noise]:
     n, count = fits.shape
     apart = ground.height - ground.height.mean(axis=1, keepdims=True)
     left = apart - terms[:, :count] @ fits.T
@@ -232,11 +237,6 @@ def _noise(series: Series, ground: Ground, terms: Array, fits: Array, request: S
         ]
     )
     if shape is not None and np.isinf(shape.reach):
-        if request.correlation_range is None and count == 1:
-            progress.warn(
-                "STABLE is too small to resolve the range of the correlated error: its unresolved part is taken to be alike "
-                "in all cells, which is a bound; draw larger stable areas, or give CORRELATION_RANGE."
-            )
         told = tuple((s, request.correlation_range or r if np.isinf(r) else r) for s, r in shape.structures)
         shape = replace(shape, structures=told)
     design = terms[:SAMPLE, : 3 if _carries_plane(terms, max(steps)) else 1]
@@ -323,9 +323,9 @@ def _tilted(fits: Array, noises: list[_Noise]) -> bool:
     return False
 
 
-def _tilt_matters(told: dict[int, list[_Noise]], centre: tuple[float, ...], places: Array) -> bool:
+def _tilt_matters(noises: list[_Noise], centre: tuple[float, ...], places: Array) -> bool:
     """Tell whether a tilt that stable ground could not see would matter at the places."""
-    noise = max(told[1], key=lambda one: float(one.covariance[0, 0]))
+    noise = max(noises, key=lambda one: float(one.covariance[0, 0]))
     if len(noise.covariance) < 3:
         return True
     offsets = places - centre[:2]
