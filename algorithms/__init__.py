@@ -9,8 +9,11 @@ from .exportdsm import ExportDsm
 from .georeference import Georeference
 from .orient import Orient
 from .predictmarks import PredictMarks
+from .profiles import Profiles
+from .shoreline import Shoreline
 from .simulatesurvey import SimulateSurvey
 from .tiepoints import TiePoints
+from .timeseries import TimeSeries
 
 ALGORITHMS = (
     CreateSurvey,
@@ -21,6 +24,9 @@ ALGORITHMS = (
     PredictMarks,
     ExportDsm,
     DsmDifference,
+    Profiles,
+    Shoreline,
+    TimeSeries,
     CompareInputs,
     SimulateSurvey,
     CheckEngine,

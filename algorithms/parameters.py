@@ -20,6 +20,7 @@ from qgis.core import (
     QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterFolderDestination,
+    QgsProcessingParameterMultipleLayers,
     QgsProcessingParameterNumber,
     QgsProcessingParameterRasterDestination,
     QgsProcessingParameterRasterLayer,
@@ -31,6 +32,7 @@ from ..i18n import tr
 _Parameter = QgsProcessingParameterDefinition
 _POLYGONS = QgsProcessing.SourceType.TypeVectorPolygon
 _POINTS = QgsProcessing.SourceType.TypeVectorPoint
+_LINES = QgsProcessing.SourceType.TypeVectorLine
 _ANY = QgsProcessing.SourceType.TypeVector
 
 
@@ -129,6 +131,17 @@ def raster(key: str, label: str, text: str, *, optional: bool = False) -> _Param
     return explained(QgsProcessingParameterRasterLayer(key, label, None, optional), text)
 
 
+def rasters(key: str, label: str, text: str, *, optional: bool = False) -> _Parameter:
+    """Return several raster layers."""
+    kind = QgsProcessing.SourceType.TypeRaster
+    return explained(QgsProcessingParameterMultipleLayers(key, label, kind, None, optional), text)
+
+
+def lines(key: str, label: str, text: str, *, optional: bool = True) -> _Parameter:
+    """Return a line layer."""
+    return explained(QgsProcessingParameterFeatureSource(key, label, [_LINES], None, optional), text)
+
+
 def survey() -> _Parameter:
     """Return the survey folder a step works in."""
     return folder("SURVEY", tr("Survey folder"), tr("The folder that 'Create survey' made. The step adds its files to it."))
@@ -177,6 +190,11 @@ def file_output(key: str, label: str, text: str, *, filters: str, by_default: bo
 def point_output(key: str, label: str, text: str) -> _Parameter:
     """Return an optional point layer to write."""
     return explained(QgsProcessingParameterFeatureSink(key, label, _POINTS, None, True, True), text)
+
+
+def line_output(key: str, label: str, text: str, *, optional: bool = True) -> _Parameter:
+    """Return a line layer to write."""
+    return explained(QgsProcessingParameterFeatureSink(key, label, _LINES, None, optional, True), text)
 
 
 def table_output(key: str, label: str, text: str, *, optional: bool = True) -> _Parameter:

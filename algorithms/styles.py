@@ -10,8 +10,10 @@ from typing import Any, Callable, List, Tuple
 
 from qgis.core import (
     QgsArrowSymbolLayer,
+    QgsCategorizedSymbolRenderer,
     QgsColorRampShader,
     QgsFillSymbol,
+    QgsGraduatedSymbolRenderer,
     QgsLineSymbol,
     QgsMarkerSymbol,
     QgsPalLayerSettings,
@@ -20,6 +22,8 @@ from qgis.core import (
     QgsProcessingLayerPostProcessorInterface,
     QgsRasterLayer,
     QgsRasterShader,
+    QgsRendererCategory,
+    QgsRendererRange,
     QgsSingleBandPseudoColorRenderer,
     QgsSingleSymbolRenderer,
     QgsTextBufferSettings,
@@ -32,9 +36,15 @@ from qgis.PyQt.QtGui import QColor
 
 _SAMPLES = 250_000  # cells looked at for a range: enough for percentiles, quick on any raster
 _NET = "format_number(\"net\", 1) || coalesce(' ± ' || format_number(\"sigma\", 1), '') || ' m³'"
+_RATE = (
+    "coalesce(format_number(\"rate\", 1) || coalesce(' ± ' || format_number(\"rate_sigma\", 1), '') || ' m³/a', "
+    "format_number(\"net\", 1) || ' m³')"
+)
 _LONGEST = 10.0  # millimetres on the map, the symbol's unit
 _TERRAIN = ("#22577a", "#e9d8a6", "#d9b26f", "#a9b665", "#6a994e", "#9c7a4d", "#f2efe9")
 _DIVERGING = ("#b2182b", "#ef8a62", "#fddbc7", "#f7f7f7", "#d1e5f0", "#67a9cf", "#2166ac")
+_WHITE, _VISIBLE = "#f7f7f7", "#bbbbbb"  # of a line, white is not seen on a white map
+_TIME = ("#fde725", "#5ec962", "#21918c", "#3b528b", "#440154")
 _PLAIN = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")
 
 
@@ -144,8 +154,110 @@ def _zones(layer: QgsVectorLayer) -> None:
     layer.setLabelsEnabled(True)
 
 
+def _by_date(layer: QgsVectorLayer, symbol: Callable[[str], Any]) -> None:
+    """Give each date a colour, the first light, the last dark."""
+    place = layer.fields().lookupField("date")
+    if place < 0:
+        return
+    dates = sorted({value for value in layer.uniqueValues(place) if isinstance(value, str)})
+    steps = max(1, len(dates) - 1)
+    categories = [
+        QgsRendererCategory(date, symbol(_mixed(_TIME, 1.0 if len(dates) == 1 else i / steps)), date)
+        for i, date in enumerate(dates)
+    ]
+    layer.setRenderer(QgsCategorizedSymbolRenderer("date", categories))
+
+
+def _mixed(colours: Tuple[str, ...], share: float) -> str:
+    """Return the colour at ``share`` (0..1) of a ramp."""
+    place = share * (len(colours) - 1)
+    first = min(int(place), len(colours) - 2)
+    low, high = QColor(colours[first]), QColor(colours[first + 1])
+    part = place - first
+    mixed = [round(low.getRgb()[i] + part * (high.getRgb()[i] - low.getRgb()[i])) for i in range(3)]
+    return QColor(*mixed).name()
+
+
+def _dated_lines(layer: QgsVectorLayer) -> None:
+    """Draw lines in the colours of their dates."""
+    _by_date(layer, lambda colour: QgsLineSymbol.createSimple({"color": colour, "width": "0.6"}))
+
+
+def _heights(layer: QgsVectorLayer) -> None:
+    """Draw points in the colours of a terrain by their height: points of several dates lie one on the other."""
+    place = layer.fields().lookupField("height")
+    if place < 0:
+        return
+    values = sorted(v[0] for v in _pairs(layer, [place]))
+    if not values:
+        return
+    count = len(_TERRAIN)
+    bounds = [values[round(i / count * (len(values) - 1))] for i in range(count + 1)]
+    shape = {"name": "circle", "size": "1.6", "outline_style": "no"}
+    ranges = []
+    for i, colour in enumerate(_TERRAIN):
+        symbol = QgsMarkerSymbol.createSimple({**shape, "color": colour})
+        ranges.append(QgsRendererRange(bounds[i], bounds[i + 1], symbol, f"{bounds[i]:.2f} to {bounds[i + 1]:.2f} m"))
+    layer.setRenderer(QgsGraduatedSymbolRenderer("height", ranges))
+
+
+def _dated_points(layer: QgsVectorLayer) -> None:
+    """Draw points in the colours of their dates."""
+    shape = {"name": "circle", "size": "1.6", "outline_style": "no"}
+    _by_date(layer, lambda colour: QgsMarkerSymbol.createSimple({**shape, "color": colour}))
+
+
+def _diverging(layer: QgsVectorLayer, field: str, symbol: Callable[[str], Any]) -> None:
+    """Draw red where ``field`` is negative, blue where positive, in classes even about zero."""
+    place = layer.fields().lookupField(field)
+    if place < 0:
+        return
+    sizes = sorted(abs(v[0]) for v in _pairs(layer, [place]))
+    limit = sizes[int(0.95 * (len(sizes) - 1))] if sizes else 0.0
+    limit = limit or 1.0
+    count = len(_DIVERGING)
+    edges = [-limit + 2.0 * limit * i / count for i in range(1, count)]
+    low, high = min([-limit, *(-v for v in sizes)]), max([limit, *sizes])
+    bounds = [low, *edges, high]
+    ranges = []
+    for i, colour in enumerate(_DIVERGING):
+        told = f"{bounds[i]:.2f} to {bounds[i + 1]:.2f}"
+        ranges.append(QgsRendererRange(bounds[i], bounds[i + 1], symbol(_VISIBLE if colour == _WHITE else colour), told))
+    layer.setRenderer(QgsGraduatedSymbolRenderer(field, ranges))
+
+
+def _thick(colour: str) -> QgsLineSymbol:
+    return QgsLineSymbol.createSimple({"color": colour, "width": "1.0"})
+
+
+def _rates(layer: QgsVectorLayer) -> None:
+    """Draw transects by their rate; by their net movement where two dates give no rate."""
+    place = layer.fields().lookupField("wlr")
+    known = place >= 0 and any(True for _ in _pairs(layer, [place]))
+    _diverging(layer, "wlr" if known else "nsm", _thick)
+
+
+def _profiles(layer: QgsVectorLayer) -> None:
+    """Draw transects by the change of sand since the first date; the last date lies on top."""
+    _diverging(layer, "change_first", _thick)
+
+
+def _zone_rates(layer: QgsVectorLayer) -> None:
+    """Draw the zones as for volumes, labelled with their rate."""
+    _zones(layer)
+    settings = layer.labeling().settings()
+    settings.fieldName = _RATE
+    layer.setLabeling(QgsVectorLayerSimpleLabeling(settings))
+
+
 TERRAIN = Style(_terrain)
 SEQUENTIAL = Style(_sequential)
 DIFFERENCE = Style(_difference)
 RESIDUALS = Style(_arrows)
 ZONES = Style(_zones)
+PROFILES = Style(_profiles)
+PROFILE_POINTS = Style(_heights)
+SHORELINES = Style(_dated_lines)
+SHORE_POSITIONS = Style(_dated_points)
+SHORE_RATES = Style(_rates)
+ZONE_RATES = Style(_zone_rates)

@@ -19,6 +19,7 @@ from qgis.PyQt.QtCore import QDate, QDateTime, Qt, QTime
 from ..i18n import tr
 from .child import Cancelled
 
+_DAY = 86400  # seconds
 _ID = "strandline_fid"  # the GeoPackage's own key, named so that no user's field is in its way
 
 
@@ -68,6 +69,24 @@ def raster_source(layer: QgsRasterLayer) -> Dict[str, Optional[str]]:
         raise LayerError(told.format(layer.name(), layer.providerType()))
     own = provider is not None and provider.crs() == layer.crs()
     return {"path": layer.source().partition("|")[0], "crs": None if own else wkt(layer.crs())}
+
+
+def dated_source(layer: QgsRasterLayer) -> Dict[str, Optional[str]]:
+    """Return how the engine finds a raster among several: also by its name, and by its day where its temporal range is one.
+
+    Raises
+    ------
+    LayerError
+        When the layer is not a file that GDAL reads.
+    """
+    date = None
+    temporal = layer.temporalProperties()
+    if temporal is not None and temporal.isActive():
+        span = temporal.fixedTemporalRange()
+        first, last = span.begin(), span.end()
+        if first.isValid() and last.isValid() and first.secsTo(last) <= _DAY:
+            date = first.toString("yyyy-MM-ddTHH:mm") if first == last else first.toString("yyyy-MM-dd")
+    return {**raster_source(layer), "name": layer.name(), "date": date}
 
 
 def open_result(path: Path) -> QgsVectorLayer:

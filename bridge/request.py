@@ -4,7 +4,7 @@ A request's field is the parameter's key in lower case; what is optional and not
 """
 
 from pathlib import Path
-from typing import Any, Dict, Optional
+from typing import Any, Dict, List, Optional
 
 from qgis.core import (
     QgsProcessingAlgorithm,
@@ -15,7 +15,7 @@ from qgis.core import (
 )
 
 from ..i18n import tr
-from .layers import LayerError, raster_source, wkt, write_source
+from .layers import LayerError, dated_source, raster_source, wkt, write_source
 
 Values = Dict[str, Any]
 
@@ -46,6 +46,11 @@ def rasters(algorithm: QgsProcessingAlgorithm, parameters: Values, context: QgsP
                 if layer is None:
                     raise QgsProcessingException(algorithm.invalidRasterError(parameters, key))
                 fields[key.lower()] = raster_source(layer)
+        elif definition.type() == "multilayer":
+            key = definition.name()
+            fields[key.lower()] = None
+            if is_given(parameters, definition) and parameters.get(key) != []:
+                fields[key.lower()] = _several(algorithm, parameters, key, context)
     return fields
 
 
@@ -63,7 +68,7 @@ def build(
     """
     fields: Values = {}
     for definition in algorithm.parameterDefinitions():
-        if definition.type() != "raster":
+        if definition.type() not in ("raster", "multilayer"):
             value = None
             if is_given(parameters, definition):
                 value = _value(algorithm, definition, parameters, context, folder, feedback)
@@ -74,6 +79,20 @@ def build(
 def sink_path(folder: Path, key: str) -> Path:
     """Return where the engine writes the features for the sink ``key``."""
     return folder / f"{key.lower()}.gpkg"
+
+
+def _several(algorithm: QgsProcessingAlgorithm, parameters: Values, key: str, context: QgsProcessingContext) -> List[Any]:
+    """Return the sources of several rasters, in their order."""
+    given = parameters.get(key)
+    layers = algorithm.parameterAsLayerList(parameters, key, context)
+    # QGIS leaves out, without a word, what it cannot load.
+    if isinstance(given, (list, tuple)) and len(layers) != len(given):
+        found = {layer.source().partition("|")[0] for layer in layers}
+        missing = [str(value) for value in given if isinstance(value, str) and value not in found]
+        raise LayerError(tr("{} cannot be loaded as rasters: {}.").format(key, ", ".join(missing) or str(given)))
+    if not layers:
+        raise QgsProcessingException(algorithm.invalidRasterError(parameters, key))
+    return [dated_source(layer) for layer in layers]
 
 
 def _value(

@@ -27,10 +27,15 @@ class VectorSource:
 
 @dataclasses.dataclass(frozen=True)
 class RasterSource:
-    """A raster file; ``crs`` is what the user's layer says (WKT2), None to take the file's."""
+    """A raster file; ``crs`` is what the user's layer says (WKT2), None to take the file's.
+
+    Of a raster among several also the layer's ``name``, and its ``date`` (ISO 8601) where its temporal range is set.
+    """
 
     path: str
     crs: str | None = None
+    name: str | None = None
+    date: str | None = None
 
 
 def decode(cls: type[T], data: Any) -> T:

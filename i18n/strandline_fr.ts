@@ -1004,16 +1004,232 @@
    <translation>Pointés prédits mais non trouvés</translation>
   </message>
   <message>
+   <source>Beach profiles</source>
+   <translation>Profils de plage</translation>
+  </message>
+  <message>
+   <source>Draws the heights along transects at any number of dates and sums the sand above a datum in m3 per metre of beach, its change since the first and the previous date, and the width of the beach, each with its standard deviation. Errors that neighbours or a whole surface share are counted. Gaps are told, never filled.</source>
+   <translation>Dessine les hauteurs le long de transects à un nombre quelconque de dates et somme le sable au-dessus d'une cote en m3 par mètre de plage, son changement depuis la première et la précédente date, et la largeur de la plage, chacun avec son écart-type. Les erreurs que des voisins ou toute une surface partagent sont comptées. Les lacunes sont signalées, jamais comblées.</translation>
+  </message>
+  <message>
+   <source>Spacing of points (m)</source>
+   <translation>Espacement des points (m)</translation>
+  </message>
+  <message>
+   <source>Along each transect; finer cells are averaged along the line. 0: the coarsest surface's cell.</source>
+   <translation>Le long de chaque transect ; des cellules plus fines sont moyennées le long de la ligne. 0 : la cellule de la surface la plus grossière.</translation>
+  </message>
+  <message>
+   <source>From distance (m)</source>
+   <translation>À partir de la distance (m)</translation>
+  </message>
+  <message>
+   <source>Sand counts from here on, from the landward end.</source>
+   <translation>Le sable compte à partir d'ici, depuis l'extrémité côté terre.</translation>
+  </message>
+  <message>
+   <source>To distance (m)</source>
+   <translation>Jusqu'à la distance (m)</translation>
+  </message>
+  <message>
+   <source>Sand counts up to here; empty: to the end of each transect.</source>
+   <translation>Le sable compte jusqu'ici ; vide : jusqu'à la fin de chaque transect.</translation>
+  </message>
+  <message>
+   <source>Profiles</source>
+   <translation>Profils</translation>
+  </message>
+  <message>
+   <source>Each transect once per date, with sand, change and width, their deviations and intervals.</source>
+   <translation>Chaque transect une fois par date, avec sable, changement et largeur, leurs écarts-types et intervalles.</translation>
+  </message>
+  <message>
+   <source>Profile points</source>
+   <translation>Points des profils</translation>
+  </message>
+  <message>
+   <source>Transect, date, distance, height and its deviation; gaps are empty.</source>
+   <translation>Transect, date, distance, hauteur et son écart-type ; les lacunes sont vides.</translation>
+  </message>
+  <message>
+   <source>Transects</source>
+   <translation>Transects</translation>
+  </message>
+  <message>
+   <source>Dates</source>
+   <translation>Dates</translation>
+  </message>
+  <message>
+   <source>Mean change from first to last date (m3 per m)</source>
+   <translation>Changement moyen de la première à la dernière date (m3 par m)</translation>
+  </message>
+  <message>
+   <source>Deviation of the mean change (m3 per m)</source>
+   <translation>Écart-type du changement moyen (m3 par m)</translation>
+  </message>
+  <message>
+   <source>Mean change of width from first to last date (m)</source>
+   <translation>Changement moyen de largeur de la première à la dernière date (m)</translation>
+  </message>
+  <message>
+   <source>Mean share of the transects with heights (%)</source>
+   <translation>Part moyenne des transects avec des hauteurs (%)</translation>
+  </message>
+  <message>
+   <source>DSMs</source>
+   <translation>MNS</translation>
+  </message>
+  <message>
+   <source>Surfaces of several dates, in any order; grids and CRS may differ.</source>
+   <translation>Surfaces de plusieurs dates, dans n'importe quel ordre ; grilles et SCR peuvent différer.</translation>
+  </message>
+  <message>
+   <source>One date for each DSM in their order, separated by commas (2018-06-06, 2018-07-13), or some by name (beach.tif=2018-06-06). Empty: the temporal range of the layer, the file's tags, or a date in its name such as 20180606 or 2018-06-06. Two surveys of one day need a time: 2018-06-06T09:30.</source>
+   <translation>Une date par MNS dans leur ordre, séparées par des virgules (2018-06-06, 2018-07-13), ou certaines par nom (plage.tif=2018-06-06). Vide : la plage temporelle de la couche, les étiquettes du fichier, ou une date dans son nom comme 20180606 ou 2018-06-06. Deux levés du même jour demandent une heure : 2018-06-06T09:30.</translation>
+  </message>
+  <message>
+   <source>Table of dates</source>
+   <translation>Table des dates</translation>
+  </message>
+  <message>
+   <source>Fields file (its name) and date, and sigma in metres where it is known. DATES wins over it, it wins over the names.</source>
+   <translation>Champs file (son nom) et date, et sigma en mètres là où il est connu. DATES l'emporte sur elle, elle l'emporte sur les noms.</translation>
+  </message>
+  <message>
+   <source>The value of empty cells in all surfaces, where their files do not say it.</source>
+   <translation>La valeur des cellules vides dans toutes les surfaces, là où leurs fichiers ne la disent pas.</translation>
+  </message>
+  <message>
+   <source>Precision rasters</source>
+   <translation>Rasters de précision</translation>
+  </message>
+  <message>
+   <source>Standard deviation of each height in metres, from 'Export DSM': one for each DSM, in the same order.</source>
+   <translation>Écart-type de chaque hauteur en mètres, tiré de « Exporter le MNS » : un par MNS, dans le même ordre.</translation>
+  </message>
+  <message>
+   <source>Deviation of a height (m)</source>
+   <translation>Écart-type d'une hauteur (m)</translation>
+  </message>
+  <message>
+   <source>Standard deviation of the heights of each surface, one number, where there are no precision rasters.</source>
+   <translation>Écart-type des hauteurs de chaque surface, un seul nombre, là où il n'y a pas de rasters de précision.</translation>
+  </message>
+  <message>
+   <source>Polygons where nothing changed, such as rock or road: they tell how each date errs against the others.</source>
+   <translation>Polygones où rien n'a changé, comme rocher ou route : ils disent comment chaque date se trompe par rapport aux autres.</translation>
+  </message>
+  <message>
+   <source>What of its departure from all dates together, on stable ground, is taken off each date: the level (vertical), a tilted plane (plane), the plane only where chance does not explain it (auto), or nothing (none). Needs STABLE.</source>
+   <translation>Ce qui, de son écart à l'ensemble des dates sur le sol stable, est retiré de chaque date : le niveau (vertical), un plan incliné (plane), le plan seulement là où le hasard ne l'explique pas (auto), ou rien (none). Demande STABLE.</translation>
+  </message>
+  <message>
+   <source>Of each surface as a whole; used where neither stable ground nor the DSM's georeferencing can tell.</source>
+   <translation>De chaque surface dans son ensemble ; sert là où ni le sol stable ni le géoréférencement du MNS ne peuvent le dire.</translation>
+  </message>
+  <message>
+   <source>Of intervals and of significance, between 0 and 1.</source>
+   <translation>Des intervalles et de la signification, entre 0 et 1.</translation>
+  </message>
+  <message>
+   <source>Lines across the beach. Each starts at its landward end and runs to the sea.</source>
+   <translation>Lignes à travers la plage. Chacune commence à son extrémité côté terre et va vers la mer.</translation>
+  </message>
+  <message>
+   <source>Field of transect names</source>
+   <translation>Champ des noms des transects</translation>
+  </message>
+  <message>
+   <source>Transects start at the sea</source>
+   <translation>Les transects commencent à la mer</translation>
+  </message>
+  <message>
+   <source>Takes the end of each line as its landward end.</source>
+   <translation>Prend la fin de chaque ligne comme son extrémité côté terre.</translation>
+  </message>
+  <message>
+   <source>Datum (m)</source>
+   <translation>Cote (m)</translation>
+  </message>
+  <message>
+   <source>Height in metres above the DSMs' own zero, also where these are in feet; above the water of every date.</source>
+   <translation>Hauteur en mètres au-dessus du zéro des MNS eux-mêmes, même s'ils sont en pieds ; au-dessus de l'eau de chaque date.</translation>
+  </message>
+  <message>
+   <source>Scale of slopes (m)</source>
+   <translation>Échelle des pentes (m)</translation>
+  </message>
+  <message>
+   <source>The slope by which heights become distances, of a robust plane over this length. 0: 5 cells, 5 m at least.</source>
+   <translation>La pente par laquelle des hauteurs deviennent des distances, d'un plan robuste sur cette longueur. 0 : 5 cellules, 5 m au moins.</translation>
+  </message>
+  <message>
+   <source>All surfaces are brought to cells of this size, finer ones by their mean. 0: the coarsest surface's own cells.</source>
+   <translation>Toutes les surfaces sont ramenées à des cellules de cette taille, les plus fines par leur moyenne. 0 : les cellules de la surface la plus grossière.</translation>
+  </message>
+  <message>
+   <source>Shorelines</source>
+   <translation>Traits de côte</translation>
+  </message>
+  <message>
+   <source>Traces the contour of each date's surface at a datum. How far it may lie beside is the deviation of the height divided by the slope. Along transects it gives the positions, their movement with its interval, and rates as DSAS names them: NSM net movement, SCE envelope, EPR end point rate, LRR and WLR linear regression, plain and weighted. Seaward is positive.</source>
+   <translation>Trace le contour de la surface de chaque date à une cote. Jusqu'où il peut se trouver à côté est l'écart-type de la hauteur divisé par la pente. Le long de transects, il donne les positions, leur mouvement avec son intervalle, et les vitesses comme DSAS les nomme : NSM mouvement net, SCE enveloppe, EPR vitesse entre extrémités, LRR et WLR régression linéaire, simple et pondérée. Vers la mer est positif.</translation>
+  </message>
+  <message>
+   <source>Least length (m)</source>
+   <translation>Longueur minimale (m)</translation>
+  </message>
+  <message>
+   <source>Shorter pieces of contour, such as puddles and stones, are left out.</source>
+   <translation>Les morceaux de contour plus courts, comme flaques et pierres, sont écartés.</translation>
+  </message>
+  <message>
+   <source>Pieces to keep</source>
+   <translation>Morceaux à garder</translation>
+  </message>
+  <message>
+   <source>All that are long enough (all), one per date (longest), or those that a transect meets most seaward (seaward). Positions are always the most seaward ones on what is kept.</source>
+   <translation>Tous ceux qui sont assez longs (all), un par date (longest), ou ceux qu'un transect rencontre le plus au large (seaward). Les positions sont toujours les plus au large sur ce qui est gardé.</translation>
+  </message>
+  <message>
+   <source>One line per date, with its slope and how far it may lie beside.</source>
+   <translation>Une ligne par date, avec sa pente et jusqu'où elle peut se trouver à côté.</translation>
+  </message>
+  <message>
+   <source>Shore positions</source>
+   <translation>Positions du trait de côte</translation>
+  </message>
+  <message>
+   <source>Where each transect meets each date's shoreline, with movement and deviations.</source>
+   <translation>Où chaque transect rencontre le trait de côte de chaque date, avec mouvement et écarts-types.</translation>
+  </message>
+  <message>
+   <source>Shoreline rates</source>
+   <translation>Vitesses du trait de côte</translation>
+  </message>
+  <message>
+   <source>The transects with NSM, SCE, EPR, LRR and WLR, their deviations and intervals.</source>
+   <translation>Les transects avec NSM, SCE, EPR, LRR et WLR, leurs écarts-types et intervalles.</translation>
+  </message>
+  <message>
+   <source>Mean net movement (m)</source>
+   <translation>Mouvement net moyen (m)</translation>
+  </message>
+  <message>
+   <source>Mean weighted rate (m per year)</source>
+   <translation>Vitesse pondérée moyenne (m par an)</translation>
+  </message>
+  <message>
+   <source>Median deviation across the shore (m)</source>
+   <translation>Écart-type médian en travers du trait de côte (m)</translation>
+  </message>
+  <message>
    <source>Simulate survey</source>
    <translation>Simuler un levé</translation>
   </message>
   <message>
    <source>Renders the photographs of a flight over an invented beach, each as RAW and as JPG, with ground points, marks, zones, and the true surfaces and volumes: to learn the steps, to plan a flight, or to see what to expect of it.</source>
    <translation>Calcule les photographies d'un vol au-dessus d'une plage inventée, chacune en RAW et en JPG, avec points au sol, pointés, zones, et les surfaces et volumes vrais : pour apprendre les étapes, préparer un vol, ou voir ce qu'on peut en attendre.</translation>
-  </message>
-  <message>
-   <source>Dates</source>
-   <translation>Dates</translation>
   </message>
   <message>
    <source>two: the beach before and after a storm, with the true volumes; one: before only.</source>
@@ -1228,6 +1444,66 @@
    <translation>Appariements vérifiés</translation>
   </message>
   <message>
+   <source>Volumes through time</source>
+   <translation>Volumes au fil du temps</translation>
+  </message>
+  <message>
+   <source>Sums the volume of each zone date by date, over the ground that has a height at every date, with the change since the first and since the previous date and their intervals. Errors are kept per date, so that changes which share a date are not taken for independent. Maps the linear rate of each cell and where it is significant; rates need three dates.</source>
+   <translation>Somme le volume de chaque zone date par date, sur le sol qui a une hauteur à chaque date, avec le changement depuis la première et depuis la précédente date et leurs intervalles. Les erreurs sont tenues par date, de sorte que des changements qui partagent une date ne sont pas pris pour indépendants. Cartographie la vitesse linéaire de chaque cellule et où elle est significative ; les vitesses demandent trois dates.</translation>
+  </message>
+  <message>
+   <source>Polygons to sum volumes in; empty: the overlap of all surfaces.</source>
+   <translation>Polygones où sommer les volumes ; vide : le recouvrement de toutes les surfaces.</translation>
+  </message>
+  <message>
+   <source>Volumes by date</source>
+   <translation>Volumes par date</translation>
+  </message>
+  <message>
+   <source>One row per zone and date: volumes in m3, deviations, intervals.</source>
+   <translation>Une ligne par zone et date : volumes en m3, écarts-types, intervalles.</translation>
+  </message>
+  <message>
+   <source>Zone rates</source>
+   <translation>Vitesses des zones</translation>
+  </message>
+  <message>
+   <source>The zones with their change from first to last date and their rate in m3 per year.</source>
+   <translation>Les zones avec leur changement de la première à la dernière date et leur vitesse en m3 par an.</translation>
+  </message>
+  <message>
+   <source>Rate</source>
+   <translation>Vitesse</translation>
+  </message>
+  <message>
+   <source>Metres per year of each cell with heights at three dates or more.</source>
+   <translation>Mètres par an de chaque cellule qui a des hauteurs à trois dates au moins.</translation>
+  </message>
+  <message>
+   <source>Significant rate</source>
+   <translation>Vitesse significative</translation>
+  </message>
+  <message>
+   <source>The rate where its interval leaves zero out.</source>
+   <translation>La vitesse là où son intervalle exclut zéro.</translation>
+  </message>
+  <message>
+   <source>Net volume from first to last date (m3)</source>
+   <translation>Volume net de la première à la dernière date (m3)</translation>
+  </message>
+  <message>
+   <source>Rate (m3 per year)</source>
+   <translation>Vitesse (m3 par an)</translation>
+  </message>
+  <message>
+   <source>Deviation of the rate (m3 per year)</source>
+   <translation>Écart-type de la vitesse (m3 par an)</translation>
+  </message>
+  <message>
+   <source>Area with heights at every date (%)</source>
+   <translation>Surface avec des hauteurs à chaque date (%)</translation>
+  </message>
+  <message>
    <source>The engine's Python {} cannot be started: {}.</source>
    <translation>Le Python du moteur {} ne peut être lancé : {}.</translation>
   </message>
@@ -1306,6 +1582,10 @@
   <message>
    <source>The feature {} of {} cannot be handed to the engine.</source>
    <translation>L'entité {} de {} ne peut être transmise au moteur.</translation>
+  </message>
+  <message>
+   <source>{} cannot be loaded as rasters: {}.</source>
+   <translation>{} ne peuvent être chargés comme rasters : {}.</translation>
   </message>
   <message>
    <source>{} is not a CRS that QGIS knows: {}.</source>

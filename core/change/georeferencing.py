@@ -36,6 +36,10 @@ class _Block:
         matrix[:count, :count] = np.reshape(self.covariance, (count, count))
         return matrix
 
+    def heights(self, crs: str, centre: tuple[float, ...]) -> Array:
+        """Return the covariance (7, 7) of the coefficients of this one model's ``height_terms`` about ``centre`` in ``crs``."""
+        return _height_covariance(self, crs, centre)
+
 
 @dataclass(frozen=True)
 class Georeferenced:

@@ -105,3 +105,41 @@ def read_raster():
             return file.read(1, masked=True).astype(float).filled(np.nan), file.profile, file.tags()
 
     return read
+
+
+@pytest.fixture
+def make_lines(tmp_path):
+    """Write lines as a layer and return its source; coordinates count from (WEST, NORTH) unless ``absolute``."""
+
+    def make(name, shapes, fields=None, *, crs=UTM, absolute=False, kind="LineString"):
+        if not absolute:
+            shapes = [shapely.transform(s, lambda xy: xy + (WEST, NORTH)) for s in shapes]
+        path = tmp_path / f"{name}.gpkg"
+        write_layer(str(path), name, crs, fields or {"number": list(range(len(shapes)))}, shapes, kind)
+        return VectorSource(str(path), name)
+
+    return make
+
+
+@pytest.fixture
+def rows():
+    """Read a layer's rows; NULL is None."""
+
+    def read(path):
+        import pyogrio
+
+        meta, _, _, columns = pyogrio.raw.read(path)
+        table = [dict(zip(meta["fields"], values, strict=True)) for values in zip(*columns, strict=True)]
+        return [{k: None if isinstance(v, float) and np.isnan(v) else v for k, v in row.items()} for row in table]
+
+    return read
+
+
+def correlated_field(random, shape, reach):
+    """A field (rows, columns) of unit variance with the spherical correlation of range ``reach`` cells, on a torus."""
+    rows, columns = shape
+    y = np.minimum(np.arange(rows), rows - np.arange(rows))[:, None]
+    x = np.minimum(np.arange(columns), columns - np.arange(columns))[None, :]
+    h = np.minimum(np.hypot(x, y) / reach, 1.0)
+    spectrum = np.maximum(np.fft.fft2(1.0 - 1.5 * h + 0.5 * h**3).real, 0.0)
+    return np.fft.ifft2(np.sqrt(spectrum) * np.fft.fft2(random.standard_normal(shape))).real

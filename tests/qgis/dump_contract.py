@@ -7,7 +7,15 @@ import typing
 from strandline.core.contract import RasterSource, VectorSource
 from strandline.core.steps import STEP_IDS, load
 
-KINDS = {VectorSource: "vector", RasterSource: "raster", str: "text", int: "integer", float: "number", bool: "switch"}
+KINDS = {
+    VectorSource: "vector",
+    RasterSource: "raster",
+    tuple[RasterSource, ...]: "rasters",
+    str: "text",
+    int: "integer",
+    float: "number",
+    bool: "switch",
+}
 
 
 def describe(field, hint):

@@ -22,6 +22,7 @@ KINDS = {
     "crs": {"text"},
     "source": {"vector"},
     "raster": {"raster"},
+    "multilayer": {"rasters"},
     "sink": {"text"},
     "rasterDestination": {"text"},
     "fileDestination": {"text"},

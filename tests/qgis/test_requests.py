@@ -411,3 +411,27 @@ def test_cancel_from_processing_stops_the_engine(fake_engine, qgis, survey):
     with pytest.raises(QgsProcessingException, match="Cancelled"):
         processing.run("strandline:enhance", {"SURVEY": survey}, feedback=feedback)
     assert time.monotonic() - start < 5.0
+
+
+def test_several_rasters_bring_their_names_and_dates(sent, qgis, tmp_path):
+    from qgis.core import QgsDateTimeRange, QgsProcessingException, QgsRasterLayer
+    from qgis.PyQt.QtCore import QDate, QDateTime, QTime
+    from test_styles import make_raster
+
+    for name in ("a", "b"):
+        make_raster(tmp_path / f"{name}.tif", [[1.0, 2.0], [3.0, 4.0]])
+    layers = [QgsRasterLayer(str(tmp_path / f"{name}.tif"), f"layer {name}") for name in ("a", "b")]
+    day = QDate(2018, 6, 6)
+    layers[1].temporalProperties().setFixedTemporalRange(
+        QgsDateTimeRange(QDateTime(day, QTime(0, 0)), QDateTime(day, QTime(23, 59)))
+    )
+    layers[1].temporalProperties().setIsActive(True)
+    given = {"DSMS": layers, "OUTPUT": str(tmp_path / "out.gpkg"), "PRECISIONS": []}
+    request = sent("timeseries", given)
+    assert request["dsms"] == [
+        {"path": str(tmp_path / "a.tif"), "crs": None, "name": "layer a", "date": None},
+        {"path": str(tmp_path / "b.tif"), "crs": None, "name": "layer b", "date": "2018-06-06"},
+    ]
+    assert request["precisions"] is None
+    with pytest.raises(QgsProcessingException):
+        sent("timeseries", {**given, "DSMS": [layers[0], str(tmp_path / "nowhere.tif")]})

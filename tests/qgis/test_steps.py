@@ -163,3 +163,43 @@ def test_models_are_up_to_date(qgis):
         for child in model.childAlgorithms().values():
             known = {o.name() for o in child.algorithm().outputDefinitions()}
             assert {o.childOutputName() for o in child.modelOutputs().values()} <= known
+
+
+def test_companions_on_real_surfaces(qgis_process, shared_data, tmp_path):
+    """Six dates by repeating a key; layers, raster and reports as a user gets them."""
+    leo = shared_data / "leo"
+    dsms = [f"DSMS={path}" for path in sorted((leo / "dsm").glob("*.tif"))]
+    transects = (f"TRANSECTS={leo / 'leo_transects.gpkg'}", "TRANSECT_FIELD=tr_id", "DATUM=0.5")
+    page = tmp_path / "report.html"
+    lines, points = tmp_path / "profiles.gpkg", tmp_path / "points.gpkg"
+    status, told, errors = qgis_process.run(
+        "run", "strandline:profiles", "--", *dsms, *transects, f"OUTPUT={lines}", f"POINTS={points}", f"OUTPUT_HTML_FILE={page}",
+    )  # fmt: skip
+    assert status == 0, errors
+    found = outputs(told)
+    assert (found["TRANSECT_COUNT"], found["DATE_COUNT"]) == ("59", "6")
+    assert page.read_text().startswith("<!DOCTYPE html>")
+
+    shores, rates = tmp_path / "shores.gpkg", tmp_path / "rates.gpkg"
+    status, told, errors = qgis_process.run(
+        "run", "strandline:shoreline", "--", *dsms, *transects, "KEEP=seaward", f"OUTPUT={shores}", f"RATES={rates}"
+    )
+    assert status == 0, errors
+    table, rate = tmp_path / "table.gpkg", tmp_path / "rate.tif"
+    status, told, errors = qgis_process.run(
+        "run", "strandline:timeseries", "--", *dsms[:3], f"OUTPUT={table}", f"RATE={rate}", "SIGMA=0.1", "CORRELATION_RANGE=20",
+        "REGISTRATION_SIGMA=0.05",
+    )  # fmt: skip
+    assert status == 0, errors
+    assert float(outputs(told)["NET_SIGMA"]) > 0
+
+    from qgis.core import QgsRasterLayer, QgsVectorLayer
+
+    for path, count in ((lines, 6 * 59), (shores, 6), (rates, 59), (table, 3)):
+        assert QgsVectorLayer(str(path), "layer", "ogr").featureCount() == count
+    assert QgsRasterLayer(str(rate), "rate").isValid()
+
+    status, told, errors = qgis_process.run("run", "strandline:timeseries", "--", dsms[0], f"OUTPUT={tmp_path / 'one.gpkg'}")
+    assert status == 1
+    assert "DSMS holds 1 raster" in errors
+    assert not (tmp_path / "one.gpkg").exists()

@@ -96,6 +96,26 @@ def test_zones_are_outlines_labelled_with_their_net_volume(qgis):
     assert told == ["-12.3 ± 1.5 m³", "3.0 m³"]
 
 
+def test_lines_of_dates_and_of_rates_are_told_apart_by_colour(qgis):
+    from qgis.core import QgsFeature, QgsVectorLayer
+    from strandline.algorithms import styles
+
+    layer = QgsVectorLayer("LineString?crs=EPSG:32631&field=date:string&field=wlr:double", "lines", "memory")
+    for row in (["2018-06-06", -2.0], ["2019-07-31", 0.0], ["2019-07-31", 0.5], ["2019-07-31", None]):
+        feature = QgsFeature(layer.fields())
+        feature.setAttributes(row)
+        layer.dataProvider().addFeature(feature)
+    styles.SHORELINES.postProcessLayer(layer, None, None)
+    assert [c.value() for c in layer.renderer().categories()] == ["2018-06-06", "2019-07-31"]
+    first, last = (c.symbol().color() for c in layer.renderer().categories())
+    assert first.lightness() > last.lightness()
+    styles.SHORE_RATES.postProcessLayer(layer, None, None)
+    ranges = layer.renderer().ranges()
+    assert ranges[0].lowerValue() == -ranges[-1].upperValue() == pytest.approx(-2.0)
+    assert ranges[0].symbol().color().red() > ranges[0].symbol().color().blue()
+    assert ranges[-1].symbol().color().blue() > ranges[-1].symbol().color().red()
+
+
 def test_a_result_that_is_to_be_loaded_gets_its_style(algorithm, fake_engine, tmp_path):
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback, QgsProcessingOutputLayerDefinition, QgsProject
     from strandline.algorithms import styles
