@@ -10,6 +10,7 @@ from .georeference import Georeference
 from .orient import Orient
 from .predictmarks import PredictMarks
 from .simulatesurvey import SimulateSurvey
+from .surveylayers import SurveyLayers
 from .tiepoints import TiePoints
 
 ALGORITHMS = (
@@ -19,6 +20,7 @@ ALGORITHMS = (
     Orient,
     Georeference,
     PredictMarks,
+    SurveyLayers,
     ExportDsm,
     DsmDifference,
     CompareInputs,

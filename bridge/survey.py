@@ -56,6 +56,10 @@ class SurveyView:
         """Return what ``step`` last gave; nothing when it was not run."""
         return dict(self._steps.get(step, {}).get("result", {}))
 
+    def finished(self, step: str) -> str:
+        """Return when ``step`` was last finished (ISO 8601), an empty text when it was not."""
+        return str(self._steps.get(step, {}).get("finished", ""))
+
     def state(self, step: str) -> str:
         """Return "missing", "stale" (something it was built on has changed since) or "ready"."""
         record = self._steps.get(step)

@@ -117,9 +117,9 @@ class Chooser(QWidget):
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
         form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
         form.addRow(tr("Survey"), self.survey)
-        form.addRow(tr("Ground points"), self.points)
+        form.addRow(tr("Ground points"), _beside(self.points))
         form.addRow(tr("Name, height"), _beside(self.name, self.height))
-        form.addRow(tr("Role"), self.role)
+        form.addRow(tr("Role"), _beside(self.role))
         form.addRow(tr("Sigmas"), _beside(self.sigma_h, self.sigma_v))
         form.addRow(tr("Marks"), _beside(self.marks, self.new))
 

@@ -20,6 +20,7 @@ from .marking import Marking
 from .marks import MarksError, MarksTable
 from .pane import Pane
 from .pointlist import PointList
+from .surveymap import add_survey, keep_residuals
 
 
 class MarkingDock(QgsDockWidget):
@@ -34,6 +35,7 @@ class MarkingDock(QgsDockWidget):
         self.predict = _button(tr("Predict"), tr("Compute where each point should be seen in which photograph"))
         self.measure = _button(tr("Measure"), tr("Look for painted targets where points are predicted, and measure them"))
         self.adjust = _button(tr("Adjust"), tr("Georeference the survey with these marks, then show the residuals"))
+        self.show_map = _button(tr("To map"), tr("Add the survey's photographs, tie points, residuals and surface to the map"))
         self.undo = _button("↶", tr("Undo (Ctrl+Z)"))
         self.redo = _button("↷", tr("Redo (Ctrl+Shift+Z)"))
         self.verdict, self.message, self.bar, self.stop = (
@@ -123,6 +125,11 @@ class MarkingDock(QgsDockWidget):
         note = tr("The areas that the last georeferencing ignored are not: use 'Adjust with...' for that.") if without else ""
         self._run("georeference", parameters, lambda results: self._adjusted(marking, results, note))
 
+    def add_to_map(self) -> None:
+        """Load the survey into the map."""
+        if self.marking is not None:
+            add_survey(self.marking.survey, self.background, lambda warnings: self.say(" ".join(warnings)), self.say)
+
     def open_dialog(self) -> None:
         """Open 'Georeference' itself, filled in, for all that the button does not ask."""
         from qgis import processing
@@ -183,6 +190,10 @@ class MarkingDock(QgsDockWidget):
     def _adjusted(self, marking: Marking, results: Dict[str, Any], note: str) -> None:
         if results.get("RESIDUALS"):
             marking.take_residuals(read_residuals(_opened(results["RESIDUALS"])))
+            try:
+                keep_residuals(marking.survey, str(results["RESIDUALS"]))
+            except OSError as error:
+                note += " " + tr("The residuals cannot be kept for the map: {}.").format(error)
         told = tr("Control: {} in plan, {} in height. Check: {}, {}.").format(
             *(_cm(results.get(k)) for k in ("PLANI_CONTROL", "ALTI_CONTROL", "PLANI_CHECK", "ALTI_CHECK"))
         )
@@ -199,6 +210,8 @@ class MarkingDock(QgsDockWidget):
 
     def _picked(self, point: str, photograph: str) -> None:
         self.selection.pick(point)
+        if not self.pane.key and not self.head.isCollapsed():
+            self.head.setCollapsed(True)  # all is chosen, the room is the photograph's
         key = (point, photograph) if photograph else None
         if self.marking is not None and key is None:
             sights = self.marking.sights(point)
@@ -211,7 +224,7 @@ class MarkingDock(QgsDockWidget):
         self.pane.refresh()
         for button, able in ((self.undo, "canUndo"), (self.redo, "canRedo")):
             button.setEnabled(marking is not None and bool(getattr(marking.undo, able)()))
-        for button in (self.predict, self.measure, self.adjust):
+        for button in (self.predict, self.measure, self.adjust, self.show_map):
             button.setEnabled(marking is not None and not self.background.busy)
 
     def _state(self) -> str:
@@ -272,6 +285,7 @@ class MarkingDock(QgsDockWidget):
         self.selection.picked.connect(lambda name: self.list.choose(name))
         self.predict.clicked.connect(self.run_predict)
         self.adjust.clicked.connect(self.run_adjust)
+        self.show_map.clicked.connect(self.add_to_map)
         self.undo.clicked.connect(lambda: self.go("undo"))
         self.redo.clicked.connect(lambda: self.go("redo"))
         self.stop.clicked.connect(self.background.cancel)
@@ -280,8 +294,8 @@ class MarkingDock(QgsDockWidget):
         self.background.ended.connect(self._progress)
 
     def _lay_out(self) -> None:
-        head = QgsCollapsibleGroupBox(tr("Survey, points and marks"))
-        QVBoxLayout(head).addWidget(self.chooser)
+        self.head = QgsCollapsibleGroupBox(tr("Survey, points and marks"))
+        QVBoxLayout(self.head).addWidget(self.chooser)
         menu = QMenu(self)
         menu.addAction(tr("Targets of this point"), lambda: self.run_measure(False))
         menu.addAction(tr("Targets of all points"), lambda: self.run_measure(True))
@@ -291,7 +305,7 @@ class MarkingDock(QgsDockWidget):
         more.addAction(tr("Adjust with..."), self.open_dialog)
         self.adjust.setMenu(more)
         self.adjust.setPopupMode(QToolButton.ToolButtonPopupMode.MenuButtonPopup)
-        tools = _row(self.predict, self.measure, self.adjust, None, self.undo, self.redo)
+        tools = _row(self.predict, self.measure, self.adjust, self.show_map, None, self.undo, self.redo)
         for label in (self.verdict, self.message):
             label.setWordWrap(True)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -305,7 +319,7 @@ class MarkingDock(QgsDockWidget):
         whole = QWidget()
         column = QVBoxLayout(whole)
         column.setContentsMargins(6, 6, 6, 6)
-        column.addWidget(head)
+        column.addWidget(self.head)
         column.addLayout(tools)
         column.addWidget(split, 1)
         column.addLayout(_row(self.bar, self.stop))
