@@ -12,6 +12,7 @@ from .predictmarks import PredictMarks
 from .profiles import Profiles
 from .shoreline import Shoreline
 from .simulatesurvey import SimulateSurvey
+from .surveylayers import SurveyLayers
 from .tiepoints import TiePoints
 from .timeseries import TimeSeries
 
@@ -22,6 +23,7 @@ ALGORITHMS = (
     Orient,
     Georeference,
     PredictMarks,
+    SurveyLayers,
     ExportDsm,
     DsmDifference,
     Profiles,

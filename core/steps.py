@@ -15,6 +15,7 @@ _MODULES = {
     "orient": ".orientation.orient",
     "georeference": ".orientation.georeference",
     "predictmarks": ".orientation.predictmarks",
+    "surveylayers": ".orientation.surveylayers",
     "exportdsm": ".surface.exportdsm",
     "dsmdifference": ".change.dsmdifference",
     "profiles": ".change.profiles",

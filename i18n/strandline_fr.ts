@@ -1592,6 +1592,238 @@
    <translation>{} n'est pas un SCR que QGIS connaît : {}.</translation>
   </message>
   <message>
+   <source>The survey {} cannot be read: {}.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Something is still running: wait for it or cancel it.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>{} cannot be started.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>It failed without a word.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>A table with the fields gcp, image, x, y, in pixels from the top-left corner.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>New...</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Make an empty table of marks, or open one that is there.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Without a field the height is the Z of the geometry.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Which points are control and which only check.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>{} is not a table of marks: it needs the fields gcp, image, x and y.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>GeoPackage (*.gpkg);;Comma-separated values (*.csv)</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Table of marks</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Survey</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Name, height</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Role</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Sigmas</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Mark ground points</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Predict</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Compute where each point should be seen in which photograph</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Measure</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Look for painted targets where points are predicted, and measure them</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Adjust</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Georeference the survey with these marks, then show the residuals</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Undo (Ctrl+Z)</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Redo (Ctrl+Shift+Z)</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Cancel</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Stop what is running</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Choose the layer of ground points, the field of their names, and the table of marks.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Choose the survey folder to begin.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>The survey is not oriented yet: run 'Orient' first. Until then all photographs are listed.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Nothing tells where the photographs were taken: mark three points in two photographs each, then adjust.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Choose a point in the list first.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>There are no marks yet: mark points in the photographs first.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>The areas that the last georeferencing ignored are not: use 'Adjust with...' for that.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>This is the first.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>This is the last.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>{} targets were measured, {} were not found.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>{} marks by eye lie more than 3 px from them and stay.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Control: {} in plan, {} in height. Check: {}, {}.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>No point of the layer has a name: choose the field of the names.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>The georeferencing is older than the orientation: adjust again.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Nothing is georeferenced yet: all photographs are listed, the nearest first. 'Predict' does it by GNSS.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>{} rows of the table name no point or photograph, are not complete, or stand twice: {}.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Survey, points and marks</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Targets of this point</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Targets of all points</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Adjust with...</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>none</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>move the mark of {}</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>mark {}</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>remove the mark of {}</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>measure {} targets</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>{} is there already.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>it cannot be created there</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>The table of marks {} cannot be made: {}.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>The table {} has no field {}: marks need gcp, image, x and y.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>The table {} cannot be edited: save it as a GeoPackage first.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>The table {} cannot be written: {}</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
    <source>the one that 'Check engine' installs</source>
    <translation>celui que « Vérifier le moteur » installe</translation>
   </message>
@@ -1606,6 +1838,138 @@
   <message>
    <source>Python of the engine</source>
    <translation>Python du moteur</translation>
+  </message>
+  <message>
+   <source>Previous photograph (P)</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Next photograph (N)</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Skip</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>The point cannot be seen here: go on to the next that is not marked (S)</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Delete</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Delete the mark (Del)</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>All</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Show all of the photograph (F)</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Enhanced</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Show the enhanced image in place of the photograph (E)</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Choose a photograph of a point in the list.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>There is no enhanced image of {}: run 'Enhance'.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Reading {}...</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>{} The enhanced image is shown.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>predicted to {:.1f} px</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>mark {:.1f} px off</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>{} cannot be shown: {}.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>not found</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>{} cannot be shown: it holds {} x {} pixels, the survey says {} x {}.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>damaged</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>it is all one value</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Point, photograph</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Off</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Of a point: in how many photographs it is marked. Of a photograph: how it was marked.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>Of a point: its residual in plan and height. Of a mark: from where it should be.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>by eye</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>score {:.2f}</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>skipped</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>It took no part in the adjustment: two marks are needed.</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>{}: {:+.3f} m east, {:+.3f} m north, {:+.3f} m up</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>as was to be expected</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>larger than expected</source>
+   <translation type="unfinished" />
+  </message>
+  <message>
+   <source>much too large</source>
+   <translation type="unfinished" />
   </message>
  </context>
 </TS>

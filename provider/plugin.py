@@ -11,10 +11,11 @@ from .provider import StrandlineProvider
 
 
 class StrandlinePlugin:
-    """Registers the provider, and in the desktop the options page."""
+    """Registers the provider, and in the desktop what belongs to its windows."""
 
     def __init__(self, iface: Any) -> None:
         self._iface, self._provider, self._options = iface, None, None
+        self._desktop = None
         self._translator = QTranslator()
         language = str(QSettings().value("locale/userLocale") or QLocale().name())[:2]
         words: Path = ROOT / "i18n" / f"strandline_{language}.qm"
@@ -29,14 +30,19 @@ class StrandlinePlugin:
 
     def initGui(self) -> None:
         """Start in the desktop."""
+        from .desktop import Desktop
         from .options import OptionsFactory
 
         self.initProcessing()
         self._options = OptionsFactory()
         self._iface.registerOptionsWidgetFactory(self._options)
+        self._desktop = Desktop(self._iface)
 
     def unload(self) -> None:
         """Leave no trace."""
+        if self._desktop is not None:
+            self._desktop.close()
+            self._desktop = None
         if self._options is not None:
             self._iface.unregisterOptionsWidgetFactory(self._options)
             self._options = None
