@@ -198,7 +198,7 @@ class CogWriter:
         # An RGB image is masked by a fourth band; values carry nodata.
         extra: dict[str, Any] = {} if self._nodata is None else {"nodata": self._nodata}
         if self._bands == 4:
-            extra = {"photometric": "RGB", "alpha": "unassociated"}
+            extra = {"photometric": "RGB", "alpha": "NON-PREMULTIPLIED"}
         self._file = rasterio.open(
             self._raw,
             "w",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import shapely
@@ -58,7 +58,7 @@ class Request:
     views: str | None = None
     filled: str | None = None
     ortho: str | None = None
-    ortho_depth: str = "8"
+    ortho_depth: Literal["8", "16"] = "8"
     points: str | None = None
     workers: int = 0
     scheduler: str | None = None

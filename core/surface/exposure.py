@@ -117,7 +117,9 @@ def _solve(value: Array, point: NDArray[np.integer], view: NDArray[np.integer], 
     terms = np.column_stack([radius**2, radius**4])
     design = sparse.hstack([sparse.csr_array((np.ones(len(value)), (rows, view)), (len(value), views)), sparse.csr_array(terms)])
     member = sparse.csr_array((np.ones(len(value)), (point, entries)), (points, len(value)))
-    weight, answer = np.ones(len(value)), np.zeros(size)
+    # Noise and scattered light are alike in dark and bright colours: the brighter, the better is the logarithm known.
+    sure = np.exp(2.0 * (value - value.mean()))
+    weight, answer = sure, np.zeros(size)
     for _ in range(_ROUNDS):
         weighted = design.multiply(weight[:, None]).tocsr()
         total, means = member @ weight, member @ weighted
@@ -129,6 +131,6 @@ def _solve(value: Array, point: NDArray[np.integer], view: NDArray[np.integer], 
         model = answer[view] + terms @ answer[views:]
         shade = np.bincount(point, weight * (value - model), points) / total
         residual = value - model - shade[point]
-        scale = 1.4826 * np.median(np.abs(residual)) + 1e-6
-        weight = 1.0 / np.maximum(1.0, np.abs(residual) / (1.5 * scale))
+        scaled = np.abs(residual) * np.sqrt(sure)
+        weight = sure / np.maximum(1.0, scaled / (1.5 * 1.4826 * np.median(scaled) + 1e-6))
     return answer

@@ -26,9 +26,10 @@ def fill(height: Floats, sigma: Floats, good: Mask, most: int, barred: Mask | No
     when it holds a barred cell, touches the window's edge, or is longer than a window is sure to hold, so that every window
     decides alike. Heights are linear between the rim's cells (Delaunay), a band two cells wide.
 
-    Sigma is never less than that of any cell of the rim: sigma^2 = max(sigma of the rim)^2 + max(r^2, w^2 d / 2), with what the
-    ground may do between taken from what its rim does: r is the rim's rms about its own plane, w its rms from cell to cell, and
-    w^2 d / 2 the variance of a random walk pinned on both sides, d cells from either.
+    Sigma is never less than that of any cell of the rim: sigma^2 = max(sigma of the rim)^2 + max(1.5 r^2, w^2 d / 2). What the
+    ground may do between is taken from what its rim does: r is the rim's rms about its own plane (once for the cell, half for
+    the two or so cells that it is interpolated from), w its rms from cell to cell, and w^2 d / 2 the variance of a random walk
+    pinned on both sides, d cells from either.
     """
     height, sigma, filled = height.copy(), sigma.copy(), np.zeros_like(good)
     if most <= 0:
@@ -75,7 +76,7 @@ def _interpolated(height: Floats, sigma: Floats, hole: Mask, rim: Mask) -> tuple
     worst = float(np.nanmax(sigma[rim])) if np.isfinite(sigma[rim]).any() else np.nan
     distance = cv2.distanceTransform(hole.astype(np.uint8), cv2.DIST_L2, 5)[hole].astype(float)
     walk = _from_cell_to_cell(height, rim)
-    return found, np.hypot(worst, np.maximum(rough, walk * np.sqrt(distance / 2)))
+    return found, np.hypot(worst, np.maximum(np.sqrt(1.5) * rough, walk * np.sqrt(distance / 2)))
 
 
 def _from_cell_to_cell(height: Floats, rim: Mask) -> float:

@@ -32,7 +32,7 @@ _HIDDEN = 100.0  # added to the lean of a view that something hides the cell fro
 _TAPER = 0.06  # share of the frame over which a photograph fades out towards its edge
 _SQUARE = 9  # cells of the mean, taken twice, that parts the bands; less than tiles overlap
 _ALIKE = 0.03  # of white: what broad colours of one place differ by in the photographs, by noise and by the light's direction
-_OUTVOTED = 0.3  # added to the lean of a view that no other agrees with
+_OUTVOTED = 1.0  # added to the lean of a view that no other agrees with where others agree
 _RATHER = 1e-3  # weight in broad colours of what is hidden: it counts where nothing else is there
 _MOST = 16  # views of a tile
 
@@ -106,8 +106,8 @@ def _take(
 def _votes(broad: Floats, lean: Floats) -> None:
     """Add to ``lean`` (views, rows, columns) what views are set back by that disagree with most in ``broad`` (the same shape).
 
-    Each view counts how many others have its grey at the place; who has fewer than the most loses a share of ``_OUTVOTED``. Of
-    two views that disagree none is set back, so that the steeper one paints.
+    Each view counts how many others have its grey at the place; who has fewer than the most is set back by a share of
+    ``_OUTVOTED``. Of two views that disagree none is, so that the steeper one paints.
     """
     views, rows, columns = lean.shape
     count = np.empty(views)
@@ -128,7 +128,7 @@ def _votes(broad: Floats, lean: Floats) -> None:
                 continue
             for i in range(views):
                 if lean[i, r, c] < _HIDDEN:
-                    lean[i, r, c] += _OUTVOTED * (most - count[i]) / most
+                    lean[i, r, c] += _OUTVOTED * (most - count[i]) / max(most - 1.0, 1.0)
 
 
 def paint(
