@@ -7,13 +7,20 @@ from qgis.core import QgsProcessingOutputDefinition, QgsProcessingParameterDefin
 from ..i18n import tr
 from . import parameters as ask
 from .base import About, StepAlgorithm
-from .styles import SEQUENTIAL, TERRAIN
+from .styles import CORRELATION, FILLED, PICTURE, PRECISION, TERRAIN, VIEWS
 
 
 class ExportDsm(StepAlgorithm):
     """The algorithm ``strandline:exportdsm``."""
 
-    STYLES = {"OUTPUT": TERRAIN, "PRECISION": SEQUENTIAL, "CORRELATION": SEQUENTIAL, "VIEWS": SEQUENTIAL, "FILLED": SEQUENTIAL}
+    STYLES = {
+        "OUTPUT": TERRAIN,
+        "PRECISION": PRECISION,
+        "CORRELATION": CORRELATION,
+        "VIEWS": VIEWS,
+        "FILLED": FILLED,
+        "ORTHO": PICTURE,
+    }
 
     def about(self) -> About:
         """Return what the algorithm is called and does."""
@@ -50,7 +57,10 @@ class ExportDsm(StepAlgorithm):
         yield ask.number(
             "FILL",
             tr("Fill gaps up to (m2)"),
-            tr("Gaps up to this area are closed by interpolation and marked in 'Filled cells'; 0 leaves them empty."),
+            tr(
+                "Gaps up to this area are closed by interpolation and marked in 'Filled cells', but never where they touch an "
+                "area to ignore or the surface's edge; 0 leaves them empty."
+            ),
             default=0.0,
         )
         yield ask.raster_output("OUTPUT", tr("DSM"), tr("Heights in metres, in the survey's CRS."), optional=False)
@@ -62,10 +72,30 @@ class ExportDsm(StepAlgorithm):
         )
         yield ask.raster_output("CORRELATION", tr("Correlation"), tr("How alike the photographs are at each cell, up to 1."))
         yield ask.raster_output("VIEWS", tr("Views"), tr("How many photographs measured each cell."))
-        yield ask.raster_output("FILLED", tr("Filled cells"), tr("1 where the height was interpolated."))
-        yield ask.raster_output("ORTHO", tr("Orthophoto"), tr("The photographs' colours on the surface."))
+        yield ask.raster_output(
+            "FILLED",
+            tr("Filled cells"),
+            tr("1 where the height was interpolated, 0 where it was measured, nodata where there is none."),
+        )
+        yield ask.raster_output(
+            "ORTHO",
+            tr("Orthophoto"),
+            tr("The photographs' colours on the surface, brought to one brightness, from those that look down most steeply."),
+        )
+        yield ask.advanced(
+            ask.choice(
+                "ORTHO_DEPTH",
+                tr("Bits of the orthophoto"),
+                tr("8: for maps and screens; 16: keeps the fine shades of RAW and 16-bit photographs, at twice the size."),
+                ("8", "16"),
+                default="8",
+            )
+        )
         yield ask.file_output(
-            "POINTS", tr("Point cloud"), tr("The surface as coloured points in a LAZ file."), filters=tr("LAZ files (*.laz)")
+            "POINTS",
+            tr("Point cloud"),
+            tr("The surface as points in a LAZ file, with colour, standard deviation (sigma) and number of photographs (views)."),
+            filters=tr("LAZ files (*.laz)"),
         )
         yield ask.workers()
         yield ask.scheduler()

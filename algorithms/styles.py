@@ -9,13 +9,17 @@ from collections.abc import Iterator
 from typing import Any, Callable, List, Tuple
 
 from qgis.core import (
+    Qgis,
     QgsArrowSymbolLayer,
     QgsCategorizedSymbolRenderer,
     QgsColorRampShader,
+    QgsContrastEnhancement,
     QgsFillSymbol,
     QgsGraduatedSymbolRenderer,
     QgsLineSymbol,
     QgsMarkerSymbol,
+    QgsMultiBandColorRenderer,
+    QgsPalettedRasterRenderer,
     QgsPalLayerSettings,
     QgsProcessingContext,
     QgsProcessingFeedback,
@@ -34,6 +38,8 @@ from qgis.core import (
 )
 from qgis.PyQt.QtGui import QColor
 
+from ..i18n import tr
+
 _SAMPLES = 250_000  # cells looked at for a range: enough for percentiles, quick on any raster
 _NET = "format_number(\"net\", 1) || coalesce(' ± ' || format_number(\"sigma\", 1), '') || ' m³'"
 _RATE = (
@@ -46,6 +52,9 @@ _DIVERGING = ("#b2182b", "#ef8a62", "#fddbc7", "#f7f7f7", "#d1e5f0", "#67a9cf", 
 _WHITE, _VISIBLE = "#f7f7f7", "#bbbbbb"  # of a line, white is not seen on a white map
 _TIME = ("#fde725", "#5ec962", "#21918c", "#3b528b", "#440154")
 _PLAIN = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")
+_DOUBT = ("#fcfdbf", "#fc8961", "#b73779", "#51127c", "#000004")
+_COUNT = ("#ffffd9", "#c7e9b4", "#41b6c4", "#225ea8", "#081d58")
+_FILLED = "#e7298a"
 
 
 class Style(QgsProcessingLayerPostProcessorInterface):
@@ -62,8 +71,8 @@ class Style(QgsProcessingLayerPostProcessorInterface):
             layer.triggerRepaint()
 
 
-def _between(layer: QgsRasterLayer, low: float, high: float, colours: Tuple[str, ...]) -> None:
-    """Draw band 1 with ``colours`` spread evenly from ``low`` to ``high``."""
+def _between(layer: QgsRasterLayer, low: float, high: float, colours: Tuple[str, ...], decimals: int = 2) -> None:
+    """Draw band 1 with ``colours`` spread evenly from ``low`` to ``high``, labelled with so many ``decimals``."""
     if not high > low:
         high = low + 1.0
     step = (high - low) / (len(colours) - 1)
@@ -71,7 +80,7 @@ def _between(layer: QgsRasterLayer, low: float, high: float, colours: Tuple[str,
     ramp.setColorRampType(QgsColorRampShader.Type.Interpolated)
     ramp.setColorRampItemList(
         [
-            QgsColorRampShader.ColorRampItem(low + i * step, QColor(colour), f"{low + i * step:.2f}")
+            QgsColorRampShader.ColorRampItem(low + i * step, QColor(colour), f"{low + i * step:.{decimals}f}")
             for i, colour in enumerate(colours)
         ]
     )
@@ -102,6 +111,62 @@ def _terrain(layer: QgsRasterLayer) -> None:
 def _sequential(layer: QgsRasterLayer) -> None:
     low, high = _range(layer)
     _between(layer, low, high, _PLAIN)
+
+
+def _precision(layer: QgsRasterLayer) -> None:
+    """Light where heights are sure, dark where they are not, from zero on."""
+    _between(layer, 0.0, _range(layer)[1], _DOUBT, 3)
+
+
+def _correlation(layer: QgsRasterLayer) -> None:
+    """Give the same correlation the same colour in every survey."""
+    _between(layer, 0.0, 1.0, _PLAIN)
+
+
+def _views(layer: QgsRasterLayer) -> None:
+    """Draw each number of photographs in a colour of its own, up to eight."""
+    classes = [
+        QgsPalettedRasterRenderer.Class(n, _blend(_COUNT, (n - 1) / 7), tr("{} and more").format(n) if n == 8 else str(n))
+        for n in range(1, 9)
+    ]
+    _classes(layer, [*classes, *(QgsPalettedRasterRenderer.Class(n, QColor(_COUNT[-1]), str(n)) for n in range(9, 256))])
+
+
+def _filled(layer: QgsRasterLayer) -> None:
+    """Draw what was interpolated alone, over whatever lies below."""
+    seen, unseen = QColor(_FILLED), QColor(0, 0, 0, 0)
+    found = [(0, unseen, tr("measured")), (1, seen, tr("interpolated"))]
+    _classes(layer, [QgsPalettedRasterRenderer.Class(value, colour, label) for value, colour, label in found])
+
+
+def _classes(layer: QgsRasterLayer, classes: List[Any]) -> None:
+    layer.setRenderer(QgsPalettedRasterRenderer(layer.dataProvider(), 1, classes))
+
+
+def _blend(colours: Tuple[str, ...], place: float) -> QColor:
+    """Return the colour at ``place`` (0..1) of evenly spread ``colours``."""
+    at = min(max(place, 0.0), 1.0) * (len(colours) - 1)
+    first = min(int(at), len(colours) - 2)
+    low, high, share = QColor(colours[first]), QColor(colours[first + 1]), at - first
+    ends = [(c.red(), c.green(), c.blue()) for c in (low, high)]
+    return QColor(*(round((1 - share) * ends[0][k] + share * ends[1][k]) for k in range(3)))
+
+
+def _picture(layer: QgsRasterLayer) -> None:
+    """Draw colours as they are, of 8 bits or 16, and not at all where there are none."""
+    provider = layer.dataProvider()
+    white = 65535.0 if provider.dataType(1) == Qgis.DataType.UInt16 else 255.0
+    renderer = QgsMultiBandColorRenderer(provider, 1, 2, 3)
+    for band, put in ((1, renderer.setRedContrastEnhancement), (2, renderer.setGreenContrastEnhancement),
+                      (3, renderer.setBlueContrastEnhancement)):  # fmt: skip
+        stretch = QgsContrastEnhancement(provider.dataType(band))
+        stretch.setContrastEnhancementAlgorithm(QgsContrastEnhancement.ContrastEnhancementAlgorithm.StretchToMinimumMaximum)
+        stretch.setMinimumValue(0.0)
+        stretch.setMaximumValue(white)
+        put(stretch)
+    if layer.bandCount() >= 4:
+        renderer.setAlphaBand(4)
+    layer.setRenderer(renderer)
 
 
 def _difference(layer: QgsRasterLayer) -> None:
@@ -252,6 +317,11 @@ def _zone_rates(layer: QgsVectorLayer) -> None:
 
 TERRAIN = Style(_terrain)
 SEQUENTIAL = Style(_sequential)
+PRECISION = Style(_precision)
+CORRELATION = Style(_correlation)
+VIEWS = Style(_views)
+FILLED = Style(_filled)
+PICTURE = Style(_picture)
 DIFFERENCE = Style(_difference)
 RESIDUALS = Style(_arrows)
 ZONES = Style(_zones)

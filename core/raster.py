@@ -178,11 +178,16 @@ class CogWriter:
         dtype: str = "float32",
         bands: int = 1,
         names: tuple[str, ...] = (),
+        unit: str = "",
+        nodata: float | None = None,
+        overviews: str = "average",
         tags: dict[str, str] | None = None,
     ) -> None:
+        """``nodata`` is NODATA for floats unless given, none for whole numbers; ``overviews`` is GDAL's resampling for them."""
         check_destination(path)
         self._path, self._grid, self._dtype, self._bands = path, grid, dtype, bands
-        self._names, self._tags = names, tags or {}
+        self._names, self._unit, self._overviews, self._tags = names, unit, overviews, tags or {}
+        self._nodata = NODATA if nodata is None and dtype == "float32" else nodata
 
     def __enter__(self) -> CogWriter:
         """Open the collecting file."""
@@ -191,7 +196,9 @@ class CogWriter:
         self._part = self._whole.__enter__()
         self._raw = self._part.with_name(self._part.name + ".raw.tmp")
         # An RGB image is masked by a fourth band; values carry nodata.
-        extra = {"nodata": NODATA} if self._dtype == "float32" else {}
+        extra: dict[str, Any] = {} if self._nodata is None else {"nodata": self._nodata}
+        if self._bands == 4:
+            extra = {"photometric": "RGB", "alpha": "NON-PREMULTIPLIED"}
         self._file = rasterio.open(
             self._raw,
             "w",
@@ -210,8 +217,8 @@ class CogWriter:
             bigtiff="if_safer",
             **extra,
         )
-        if self._dtype == "float32":
-            _fill(self._file)
+        if self._nodata:
+            _fill(self._file, self._nodata)
         return self
 
     def write(self, patch: Patch) -> None:
@@ -236,11 +243,9 @@ class CogWriter:
                 if kind is None:
                     for band, name in enumerate(self._names, start=1):
                         self._file.set_band_description(band, name)
+                    if self._unit:
+                        self._file.units = (self._unit,) * self._bands
                     self._file.update_tags(AREA_OR_POINT="Area", **self._tags)
-                    if self._bands == 4:
-                        self._file.colorinterp = tuple(
-                            getattr(rasterio.enums.ColorInterp, c) for c in ("red", "green", "blue", "alpha")
-                        )
                 self._file.close()
                 if kind is None:
                     self._finish()
@@ -262,7 +267,9 @@ class CogWriter:
             compress="deflate",
             predictor="yes",
             blocksize=_BLOCK,
-            overview_resampling="average",
+            overview_resampling=self._overviews,
+            # What lies in a picture's colours tells nothing; of values QGIS wants to know the range at once.
+            statistics="NO" if self._bands == 4 else "YES",
             bigtiff="if_safer",
             num_threads=1,
         )
@@ -275,10 +282,10 @@ def write_cog(path: str, grid: Grid, patches: Iterable[Patch], **options: Any) -
             writer.write(patch)
 
 
-def _fill(file: Any) -> None:
+def _fill(file: Any, value: float) -> None:
     for _, window in file.block_windows(1):
         shape = (file.count, int(window.height), int(window.width))
-        file.write(np.full(shape, NODATA, np.float32), window=window)
+        file.write(np.full(shape, value, file.dtypes[0]), window=window)
 
 
 __all__ = ["NODATA", "CogWriter", "Grid", "Patch", "RasterFile", "Resampling", "check_destination", "write_cog"]

@@ -552,8 +552,8 @@
    <translation>Combler les trous jusqu'à (m2)</translation>
   </message>
   <message>
-   <source>Gaps up to this area are closed by interpolation and marked in 'Filled cells'; 0 leaves them empty.</source>
-   <translation>Les trous jusqu'à cette aire sont comblés par interpolation et marqués dans « Cellules comblées » ; 0 les laisse vides.</translation>
+   <source>Gaps up to this area are closed by interpolation and marked in 'Filled cells', but never where they touch an area to ignore or the surface's edge; 0 leaves them empty.</source>
+   <translation>Les trous jusqu'à cette surface sont comblés par interpolation et marqués dans « Cellules comblées », mais jamais lorsqu'ils touchent une zone à ignorer ou le bord de la surface ; 0 les laisse vides.</translation>
   </message>
   <message>
    <source>DSM</source>
@@ -592,24 +592,32 @@
    <translation>Cellules comblées</translation>
   </message>
   <message>
-   <source>1 where the height was interpolated.</source>
-   <translation>1 là où la hauteur a été interpolée.</translation>
+   <source>1 where the height was interpolated, 0 where it was measured, nodata where there is none.</source>
+   <translation>1 où l'altitude a été interpolée, 0 où elle a été mesurée, sans donnée où il n'y en a pas.</translation>
   </message>
   <message>
    <source>Orthophoto</source>
    <translation>Orthophoto</translation>
   </message>
   <message>
-   <source>The photographs' colours on the surface.</source>
-   <translation>Les couleurs des photographies sur la surface.</translation>
+   <source>The photographs' colours on the surface, brought to one brightness, from those that look down most steeply.</source>
+   <translation>Les couleurs des photographies sur la surface, ramenées à une même luminosité, prises de celles qui regardent le plus à la verticale.</translation>
+  </message>
+  <message>
+   <source>Bits of the orthophoto</source>
+   <translation>Bits de l'orthophoto</translation>
+  </message>
+  <message>
+   <source>8: for maps and screens; 16: keeps the fine shades of RAW and 16-bit photographs, at twice the size.</source>
+   <translation>8 : pour les cartes et les écrans ; 16 : conserve les nuances fines des photographies RAW et 16 bits, pour une taille double.</translation>
   </message>
   <message>
    <source>Point cloud</source>
    <translation>Nuage de points</translation>
   </message>
   <message>
-   <source>The surface as coloured points in a LAZ file.</source>
-   <translation>La surface en points colorés dans un fichier LAZ.</translation>
+   <source>The surface as points in a LAZ file, with colour, standard deviation (sigma) and number of photographs (views).</source>
+   <translation>La surface sous forme de points dans un fichier LAZ, avec la couleur, l'écart-type (sigma) et le nombre de photographies (views).</translation>
   </message>
   <message>
    <source>LAZ files (*.laz)</source>
@@ -1398,6 +1406,18 @@
   <message>
    <source>True net volume (m3)</source>
    <translation>Volume net vrai (m3)</translation>
+  </message>
+  <message>
+   <source>{} and more</source>
+   <translation>{} et plus</translation>
+  </message>
+  <message>
+   <source>measured</source>
+   <translation>mesurée</translation>
+  </message>
+  <message>
+   <source>interpolated</source>
+   <translation>interpolée</translation>
   </message>
   <message>
    <source>Find tie points</source>

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .mosaic import Mosaic, Tile
-from .plan import Plan
+from .plan import Level, Plan
 from .sampling import visible
 from .views import TileView
 
@@ -80,18 +80,24 @@ class Coarser:
     step: float
 
 
+def coarser_window(tile: Tile, coarser: Level) -> tuple[int, int, int, int]:
+    """Return first row, first column, rows, columns of what a tile needs of the coarser level."""
+    top, left, rows, columns = tile.window
+    r0, c0 = max(0, top // 2 - _HORIZON), max(0, left // 2 - _HORIZON)
+    r1 = min(coarser.rows, -(-(top + rows) // 2) + _HORIZON)
+    c1 = min(coarser.columns, -(-(left + columns) // 2) + _HORIZON)
+    return r0, c0, r1 - r0, c1 - c0
+
+
 def coarser_surface(plan: Plan, tile: Tile) -> Coarser | None:
     """Return what the level before found around ``tile``, None on the coarsest level."""
     place = plan.levels.index(tile.level)
     if place == 0:
         return None
     level = plan.levels[place - 1]
-    top, left, rows, columns = tile.window
-    r0, c0 = max(0, top // 2 - _HORIZON), max(0, left // 2 - _HORIZON)
-    r1 = min(level.rows, -(-(top + rows) // 2) + _HORIZON)
-    c1 = min(level.columns, -(-(left + columns) // 2) + _HORIZON)
+    r0, c0, rows, columns = coarser_window(tile, level)
     mosaic = Mosaic(plan.scratch, level, tile.core, tile.overlap)
-    surface = mosaic.blend("height", r0, c0, r1 - r0, c1 - c0, tolerance=2 * level.step)
+    surface = mosaic.blend("height", r0, c0, rows, columns, tolerance=2 * level.step)
     return Coarser(surface, r0, c0, level.cell, level.step)
 
 

@@ -5,40 +5,44 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
+from ..block import Block
 from ..contract import VectorSource, decode
 from ..errors import InputError, NotEnoughData
 from ..files import copy_file, digest, remove
 from ..georef import FOLDER, Georef
 from ..orientation.sparse import read_block
-from ..parallel import run_calls
 from ..progress import SILENT, Progress
-from ..raster import RasterFile, check_destination
+from ..raster import RasterFile
 from ..survey import Survey, held
 from ..vector import polygons
-from .finish import FINGERPRINT, Summary, finish
-from .match import match_tile
-from .mosaic import tiles
+from .bands import coarser_window
+from .checks import RASTERS, check_files, check_numbers, check_photographs, check_room, holes
+from .exposure import Balance, find_balance
+from .finish import FINGERPRINT, Summary, Wanted, finish
+from .holdout import split
+from .mosaic import Tile, needed, save, tiles
 from .page import write_page
 from .plan import Plan, base_over_height, covered_bounds, fit_trend, ground_pixel, make_levels, search_range, snapped_grid
-from .points import check_points_destination
+from .work import Sharing, Stages, compute_levels
 
-_VERSION = 2  # of the algorithms; raised when the same request gives another surface
+Array = NDArray[np.float64]
+
+_VERSION = 3  # of the algorithms; raised when the same request gives another surface
 _SCRATCH = "dense"
-_FINEST = 1e-4  # m
-_RASTERS = ("output", "precision", "correlation", "views", "filled", "ortho")
-_POOL = 4  # tiles from which on a pool of processes is worth its start
+_POOL = 12  # photographs from which on a pool of processes is worth its start, for a glance at each
 
 
 @dataclass(frozen=True)
 class Request:
     """``resolution`` in metres (0 = two ground pixels), ``window`` in cells (0 = adaptive), ``fill`` in m2.
 
-    The outputs are files to write.
+    The outputs are files to write; ``ortho_depth`` is 8 or 16, the bits of a colour.
     """
 
     survey: str
@@ -54,6 +58,7 @@ class Request:
     views: str | None = None
     filled: str | None = None
     ortho: str | None = None
+    ortho_depth: Literal["8", "16"] = "8"
     points: str | None = None
     workers: int = 0
     scheduler: str | None = None
@@ -91,7 +96,12 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     NotEnoughData
         When the photographs do not see any ground twice.
     """
-    _check(request)
+    outputs = {name: path for name in (*RASTERS, "points") if (path := getattr(request, name))}
+    check_numbers(
+        request.window, request.ortho_depth, resolution=request.resolution, regularity=request.regularity, fill=request.fill
+    )
+    check_files(outputs, request.output_html_file)
+    stages = Stages()
     with held(request.survey, "exportdsm"):
         survey = Survey.open(request.survey)
         standing = survey.require("georeference")
@@ -101,15 +111,23 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         ignore = polygons(request.ignore, crs) if request.ignore else []
         shapes = [[shapely.to_wkb(g, hex=True) for g in layer] for layer in (area, ignore)]
         surface_key = [_VERSION, standing.fingerprint, request.resolution, request.window, request.regularity, shapes[0]]
-        fingerprint = digest(surface_key, shapes[1], request.fill)
+        fingerprint = digest(surface_key, shapes[1], request.fill, request.ortho_depth)
         again = _standing(survey, request, fingerprint)
         if again is not None:
             progress.info("The rasters stand already, made from the same survey under the same parameters.")
             progress.at(1.0)
             return again
         scratch = survey.folder / _SCRATCH / digest(surface_key)
-        plan = _plan(survey, georef, request, area, str(scratch), progress)
-        _match(plan, request, progress.part(0.02, 0.9))
+        with stages.of("plan"):
+            start = _start(survey, georef, request, area, str(scratch), progress)
+        plan, sharing = start.plan, Sharing(request.workers, request.scheduler)
+        check_photographs(outputs, plan.paths)
+        wanted = Wanted(outputs, area, ignore, holes(request.fill, plan.grid.cell), int(request.ortho_depth))
+        cut = _cut(plan, area, ignore)
+        check_room(plan, cut, outputs)
+        with stages.of("brightness of the photographs"):
+            plan = replace(plan, balance=_balance(start, Path(scratch), sharing, progress.part(0.01, 0.03)))
+        compute_levels(plan, cut, sharing, stages, progress.part(0.03, 0.93))
         georeferencing = {
             "frame": asdict(georef.frame),
             "pivot": georef.pivot,
@@ -121,18 +139,19 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             "window": request.window,
             "regularity": request.regularity,
             "fill": request.fill,
+            "ortho_depth": int(request.ortho_depth),
         }
-        outputs = {name: path for name in (*_RASTERS, "points") if (path := getattr(request, name))}
-        summary = finish(
-            plan, outputs, area, ignore, request.fill, fingerprint, georeferencing, parameters, progress.part(0.9, 0.99)
-        )
+        with stages.of("finishing"):
+            summary = finish(
+                plan, cut[-1], wanted, start.left_out, fingerprint, georeferencing, parameters, progress.part(0.93, 0.99)
+            )
         result = Result(
             gsd=plan.gsd,
             coverage_percent=summary.coverage_percent,
             median_precision=summary.median_precision,
             **outputs,
         )
-        write_page(survey.report_path("exportdsm"), request.output_html_file, plan, summary, parameters)
+        write_page(survey.report_path("exportdsm"), request.output_html_file, plan, summary, parameters, stages.listed)
         sizes = {name: Path(path).stat().st_size for name, path in outputs.items()}
         survey.finish(
             "exportdsm",
@@ -147,36 +166,34 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
     return result
 
 
-def _check(request: Request) -> None:
-    for name in _RASTERS:
-        if path := getattr(request, name):
-            check_destination(path)
-    if request.points:
-        check_points_destination(request.points)
-    if request.window and not (3 <= request.window <= 31 and request.window % 2):
-        raise InputError(f"WINDOW={request.window} is not an odd number from 3 to 31: choose one, or 0 to adapt it.")
-    for name in ("resolution", "regularity", "fill"):
-        if getattr(request, name) < 0:
-            raise InputError(f"{name.upper()}={getattr(request, name):g} is negative: give 0 or more.")
-    if 0 < request.resolution < _FINEST:
-        raise InputError(f"RESOLUTION={request.resolution:g} m is finer than any photograph: give metres, or 0 for two pixels.")
-    outputs = [str(Path(path).absolute()) for name in (*_RASTERS, "points") if (path := getattr(request, name))]
-    twice = sorted({path for path in outputs if outputs.count(path) > 1})
-    if twice:
-        raise InputError(f"{twice[0]} is named for two outputs: give each a name of its own.")
+@dataclass(frozen=True)
+class _Start:
+    """The plan, the block that it was made from, and the tie points left out (n, 3: easting, northing, height)."""
+
+    plan: Plan
+    block: Block
+    left_out: Array
 
 
-def _plan(survey: Survey, georef: Georef, request: Request, area: list[Any], scratch: str, progress: Progress) -> Plan:
+def _start(survey: Survey, georef: Georef, request: Request, area: list[Any], scratch: str, progress: Progress) -> _Start:
     block = read_block(survey.folder / FOLDER)
     if len(block.views) < 2:
         raise NotEnoughData(
             f"The georeferenced block of {survey.folder} has fewer than two photographs: no height can be measured."
         )
     listed = {p.name: p for p in survey.photographs}
-    missing = [v.name for v in block.views if v.name not in listed]
-    if missing:
-        raise InputError(f"{missing[0]} is oriented but not in the survey {survey.folder}: run strandline:orient again.")
-    paths = tuple(str(survey.path(listed[v.name])) for v in block.views)
+    paths = []
+    for view in block.views:
+        photograph = listed.get(view.name)
+        if photograph is None:
+            raise InputError(f"{view.name} is oriented but not in the survey {survey.folder}: run strandline:orient again.")
+        if (photograph.width, photograph.height) != (view.camera.width, view.camera.height):
+            raise InputError(
+                f"{view.name} has {photograph.width} x {photograph.height} pixels but was oriented with {view.camera.width} x "
+                f"{view.camera.height}: run strandline:orient and strandline:georeference again."
+            )
+        paths.append(str(survey.path(photograph)))
+    block, left_out = split(block)
     gsd, base = ground_pixel(block), base_over_height(block)
     resolution = request.resolution or 2.0 * gsd
     if resolution < 0.5 * gsd:
@@ -194,27 +211,61 @@ def _plan(survey: Survey, georef: Georef, request: Request, area: list[Any], scr
     plane, found = fit_trend(points, grid.west, grid.north)
     flying = float(np.median([v.centre[2] for v in block.views]) - np.median(block.points[:, 2]))
     relief = search_range(found, flying)
-    levels = make_levels(grid, relief, base)
-    return Plan(block.views, paths, georef.frame, grid, plane, relief, levels, gsd, request.window, request.regularity, scratch)
+    plan = Plan(
+        block.views,
+        tuple(paths),
+        georef.frame,
+        grid,
+        plane,
+        relief,
+        make_levels(grid, relief, base),
+        gsd,
+        request.window,
+        request.regularity,
+        scratch,
+        Balance.none(len(block.views)),
+    )
+    return _Start(plan, block, georef.frame.to_crs(left_out) if len(left_out) else left_out)
 
 
-def _match(plan: Plan, request: Request, progress: Progress) -> None:
-    """Compute all tiles of all levels; a level needs the one before it."""
-    work = [level.rows * level.columns for level in plan.levels]
-    done = 0
-    for level, cells in zip(plan.levels, work, strict=True):
-        part = progress.part(done / sum(work), (done + cells) / sum(work))
-        cut = tiles(level)
-        for _ in run_calls(
-            match_tile,
-            ((plan, tile) for tile in cut),
-            workers=request.workers if len(cut) >= _POOL else 1,
-            scheduler=request.scheduler,
-            progress=part,
-            total=len(cut),
-        ):
-            pass
-        done += cells
+def _cut(plan: Plan, area: list[Any], ignore: list[Any]) -> list[list[Tile]]:
+    """Return the tiles to compute of each level: those that AREA without IGNORE touches, and what these need.
+
+    Raises
+    ------
+    InputError
+        When nothing is left of the area.
+    """
+    bounds = shapely.box(*plan.grid.bounds)
+    left = shapely.difference(
+        shapely.intersection(bounds, shapely.union_all(area)) if area else bounds, shapely.union_all(ignore)
+    )
+    if shapely.is_empty(left) or not shapely.area(left) > 0:
+        raise InputError("IGNORE covers all that the photographs and AREA leave to measure: check its place.")
+    shapely.prepare(left)
+    finest = []
+    for tile in tiles(plan.levels[-1]):
+        row, column, rows, columns = tile.core_window
+        if shapely.intersects(left, shapely.box(*plan.grid.window(column, row, columns, rows).bounds)):
+            finest.append(tile)
+    return needed(plan.levels, finest, coarser_window)
+
+
+def _balance(start: _Start, scratch: Path, sharing: Sharing, progress: Progress) -> Balance:
+    """Return how bright the photographs are, kept with the tiles because it takes a look at each photograph."""
+    path = scratch / "balance.npz"
+    if path.is_file():
+        with np.load(path, allow_pickle=False) as data:
+            return Balance(data["gain"], data["fall"])
+    balance = find_balance(
+        start.block,
+        start.plan.paths,
+        workers=sharing.workers if len(start.plan.paths) >= _POOL else 1,
+        scheduler=sharing.scheduler,
+        progress=progress,
+    )
+    save(path, gain=balance.gain, fall=balance.fall)
+    return balance
 
 
 def _standing(survey: Survey, request: Request, fingerprint: str) -> Result | None:
@@ -223,7 +274,7 @@ def _standing(survey: Survey, request: Request, fingerprint: str) -> Result | No
     if record is None or record.fingerprint != fingerprint or survey.is_stale("exportdsm"):
         return None
     sizes = record.result.get("bytes", {})
-    for name in (*_RASTERS, "points"):
+    for name in (*RASTERS, "points"):
         path = getattr(request, name)
         if not path:
             continue
@@ -240,7 +291,7 @@ def _standing(survey: Survey, request: Request, fingerprint: str) -> Result | No
             return None
         copy_file(page, request.output_html_file)
     recorded = decode(Result, {k: v for k, v in record.result.items() if k != "bytes"})
-    unwanted: dict[str, Any] = {name: None for name in (*_RASTERS, "points") if not getattr(request, name)}
+    unwanted: dict[str, Any] = {name: None for name in (*RASTERS, "points") if not getattr(request, name)}
     return replace(recorded, **unwanted)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from .bands import Band, Coarser, Place, band_about, band_on_trend, coarser_surf
 from .correlation import fill_costs
 from .crops import cut, reduction
 from .mosaic import Tile, save
-from .ortho import paint
+from .ortho import Layer, paint
 from .pictures import Pictures
 from .plan import Plan
 from .regularisation import refine, regularise
@@ -157,15 +159,23 @@ def _costs(
 
 def _colour(
     plan: Plan, tile: Tile, place: Place, views: list[TileView], coarser: Coarser | None, surface: Floats
-) -> NDArray[np.uint8]:
-    """Return the tile's orthophoto (rows, columns, 4), painted from all photographs that look at it."""
+) -> NDArray[np.uint16]:
+    """Return the tile's orthophoto (rows, columns, 4; 16 bits), painted from the photographs that look at it."""
     cell, step = tile.level.cell, tile.level.step
-    layers = []
-    for view in views:
-        if not view.inside(place.west, place.north, cell, surface).any():
-            continue
+
+    def unhidden_from(view: TileView) -> Mask:
         free = unhidden(view, surface, cell, place, step)
-        if coarser:
-            free &= unhidden_by(coarser, view, tile, place)
-        layers.append((view, free, plan.paths[view.index], reduction(view, cell)))
+        return free & unhidden_by(coarser, view, tile, place) if coarser else free
+
+    layers = [
+        Layer(
+            view,
+            partial(unhidden_from, view),
+            plan.paths[view.index],
+            reduction(view, cell),
+            plan.balance.gain[view.index],
+            plan.balance.fall,
+        )
+        for view in views
+    ]
     return paint(layers, _pictures, surface, place.west, place.north, cell)

@@ -6,7 +6,8 @@ up to noise, and heights pass gradually from one to the other.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from .plan import Level
 
 CORE = 512
 OVERLAP = 40
+_KEPT = 48  # layers of tiles kept at hand: those of a window and its neighbours
+_NOTHING = {"height": np.nan, "score": np.nan, "sigma": np.nan}  # in tiles that were not computed; 0 in other layers
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,26 @@ def tiles(level: Level, core: int = CORE, overlap: int = OVERLAP) -> list[Tile]:
     return out
 
 
+def needed(
+    levels: tuple[Level, ...], finest: list[Tile], window: Callable[[Tile, Level], tuple[int, int, int, int]]
+) -> list[list[Tile]]:
+    """Return the tiles to compute of each level, from coarse to fine, so that ``finest`` can be.
+
+    ``window`` returns first row, first column, rows and columns of what a tile needs of the next coarser level.
+    """
+    out = [finest]
+    for level in reversed(levels[:-1]):
+        asking = out[0]
+        core, overlap = (asking[0].core, asking[0].overlap) if asking else (CORE, OVERLAP)
+        places = {
+            (tile.row, tile.column)
+            for asked in asking
+            for tile in touching(level, *window(asked, level), core=core, overlap=overlap)
+        }
+        out.insert(0, [tile for tile in tiles(level, core, overlap) if (tile.row, tile.column) in places])
+    return out
+
+
 def save(path: Path, **layers: Any) -> None:
     """Write a finished tile, whole or not at all."""
     with whole(path) as part, part.open("wb") as stream:
@@ -82,24 +105,28 @@ def save(path: Path, **layers: Any) -> None:
 
 
 class Mosaic:
-    """Reads windows of a finished level from its tiles' files."""
+    """Reads windows of a finished level from its tiles' files; ``only`` are those that were computed, None when all were."""
 
-    def __init__(self, scratch: str, level: Level, core: int = CORE, overlap: int = OVERLAP) -> None:
+    def __init__(
+        self, scratch: str, level: Level, core: int = CORE, overlap: int = OVERLAP, *, only: list[Tile] | None = None
+    ) -> None:
         self._scratch, self._level, self._core, self._overlap = scratch, level, core, overlap
+        self._only = None if only is None else {(tile.row, tile.column) for tile in only}
+        self._at_hand = OrderedDict[tuple[int, int, str], NDArray[Any]]()
 
     def read(self, layer: str, row: int, column: int, rows: int, columns: int) -> NDArray[Any]:
-        """Return a layer of a window: each cell from the tile whose core holds it."""
+        """Return a layer of a window: each cell from the tile whose core holds it; NaN or 0 where none was computed."""
         out: NDArray[Any] | None = None
-        for tile in self._touching(row, column, rows, columns):
+        for tile in self._standing(row, column, rows, columns):
             top, left, height, width = tile.core_window
             r0, r1 = max(row, top), min(row + rows, top + height)
             c0, c1 = max(column, left), min(column + columns, left + width)
             if r0 >= r1 or c0 >= c1:
                 continue
-            data = _load(tile, self._scratch, layer)
+            data = self._load(tile, layer)
             top, left = tile.window[:2]
             if out is None:
-                out = np.empty((rows, columns, *data.shape[2:]), data.dtype)
+                out = np.full((rows, columns, *data.shape[2:]), _NOTHING.get(layer, 0), data.dtype)
             out[r0 - row : r1 - row, c0 - column : c1 - column] = data[r0 - top : r1 - top, c0 - left : c1 - left]
         assert out is not None
         return out
@@ -108,7 +135,7 @@ class Mosaic:
         """Return a layer of a window, averaged in the overlaps where tiles agree to ``tolerance``; NaN as in the core."""
         own = self.read(layer, row, column, rows, columns)
         total, weights = np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.float32)
-        for tile in self._touching(row, column, rows, columns):
+        for tile in self._standing(row, column, rows, columns):
             top, left, height, width = tile.window
             r0, r1 = max(row, top), min(row + rows, top + height)
             c0, c1 = max(column, left), min(column + columns, left + width)
@@ -116,7 +143,7 @@ class Mosaic:
                 continue
             here = slice(r0 - row, r1 - row), slice(c0 - column, c1 - column)
             there = slice(r0 - top, r1 - top), slice(c0 - left, c1 - left)
-            data = _load(tile, self._scratch, layer)[there]
+            data = self._load(tile, layer)[there]
             with np.errstate(invalid="ignore"):
                 agrees = np.abs(data - own[here]) <= tolerance
             weight = np.where(agrees, tile.weight()[there], 0)
@@ -124,15 +151,27 @@ class Mosaic:
             weights[here] += weight
         return np.asarray(own + total / np.maximum(weights, 1e-9), np.float32)
 
-    def _touching(self, row: int, column: int, rows: int, columns: int) -> Iterator[Tile]:
-        core, overlap = self._core, self._overlap
-        for top in range(max(0, (row - overlap) // core * core), min(row + rows + overlap, self._level.rows), core):
-            for left in range(
-                max(0, (column - overlap) // core * core), min(column + columns + overlap, self._level.columns), core
-            ):
-                yield Tile(self._level, top, left, core, overlap)
+    def _standing(self, row: int, column: int, rows: int, columns: int) -> Iterator[Tile]:
+        for tile in touching(self._level, row, column, rows, columns, self._core, self._overlap):
+            if self._only is None or (tile.row, tile.column) in self._only:
+                yield tile
+
+    def _load(self, tile: Tile, layer: str) -> NDArray[Any]:
+        key = tile.row, tile.column, layer
+        if key in self._at_hand:
+            self._at_hand.move_to_end(key)
+            return self._at_hand[key]
+        with np.load(tile.path(self._scratch), allow_pickle=False) as data:
+            self._at_hand[key] = np.asarray(data[layer])
+        if len(self._at_hand) > _KEPT:
+            self._at_hand.popitem(last=False)
+        return self._at_hand[key]
 
 
-def _load(tile: Tile, scratch: str, layer: str) -> NDArray[Any]:
-    with np.load(tile.path(scratch), allow_pickle=False) as data:
-        return np.asarray(data[layer])
+def touching(
+    level: Level, row: int, column: int, rows: int, columns: int, core: int = CORE, overlap: int = OVERLAP
+) -> Iterator[Tile]:
+    """Yield the tiles whose windows reach into a window of a level."""
+    for top in range(max(0, (row - overlap) // core * core), min(row + rows + overlap, level.rows), core):
+        for left in range(max(0, (column - overlap) // core * core), min(column + columns + overlap, level.columns), core):
+            yield Tile(level, top, left, core, overlap)

@@ -88,15 +88,15 @@ def read_grey(path: str, level: int) -> NDArray[Any]:
     return picture.sum(axis=2, dtype=np.float32) * np.float32(255.0 / np.iinfo(picture.dtype).max)
 
 
-def _coloured(raw: RawPhotograph, level: int) -> NDArray[np.uint8]:
+def _coloured(raw: RawPhotograph, level: int) -> NDArray[np.uint16]:
     """Return a RAW at 1 / 2**``level`` of its size, white-balanced and on a gamma curve; grey unless it has three colours."""
     light = _mean_over(colours(raw), 2**level).reshape(-1, raw.channels)
     shades = np.arange(SATURATION + 1) / SATURATION
-    out = np.empty((len(light), 3), np.uint8)
+    out = np.empty((len(light), 3), np.uint16)
     for k in range(3):
         # A curve for each channel, from a table: the power of millions of pixels takes longer than all the rest.
         gain = raw.balance[k] if raw.channels == 3 else 1.0
-        table = np.rint(255.0 * gamma_coded(np.minimum(gain * shades, 1.0))).astype(np.uint8)
+        table = np.rint(SATURATION * gamma_coded(np.minimum(gain * shades, 1.0))).astype(np.uint16)
         out[:, k] = table[light[:, k] if raw.channels == 3 else light.mean(axis=1).astype(np.uint16)]
     rows, columns = (-(-n // 2**level) for n in raw.values.shape[:2])
     return out.reshape(rows, columns, 3)

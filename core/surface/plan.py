@@ -13,6 +13,7 @@ from ..block import Block, View
 from ..errors import InputError, NotEnoughData
 from ..frames import LocalFrame
 from ..raster import Grid
+from .exposure import Balance
 from .views import STEEPEST, tile_views
 
 Array = NDArray[np.float64]
@@ -54,6 +55,7 @@ class Plan:
     window: int
     regularity: float
     scratch: str
+    balance: Balance
 
     @property
     def datum(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 from pyproj import CRS
 
+from .. import __version__
 from ..errors import InputError
 from ..files import remove_abandoned, require_writable, whole
 from ..raster import Grid
 
-_SCALE = 0.001  # metres
+_FINEST = 1e-4  # metres; what heights are stored to
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A patch of cells (rows, columns): height (m; NaN: no point), sigma (m), views, filled, colour (.., 3 or 4; 16 bits)."""
+
+    height: NDArray[np.float32]
+    sigma: NDArray[np.float32]
+    views: NDArray[np.uint8]
+    filled: NDArray[np.bool_]
+    colour: NDArray[np.uint16]
 
 
 def check_points_destination(path: str) -> None:
@@ -32,17 +45,34 @@ def check_points_destination(path: str) -> None:
 
 
 class PointWriter:
-    """Writes cells as coloured points. Use as a context manager: the file is whole or absent."""
+    """Writes cells as coloured points with sigma and views. Use as a context manager: the file is whole or absent.
 
-    def __init__(self, path: str, grid: Grid) -> None:
-        self._path, self._grid = path, grid
+    Sigma (``sigma``, metres) and the number of photographs (``views``) are extra dimensions, which PDAL, laspy and QGIS show by
+    these names. Filled cells are synthetic, by LAS's own flag.
+    """
+
+    def __init__(self, path: str, grid: Grid, datum: float = 0.0) -> None:
+        """``datum`` is a height (m) in the middle of the surface's, from which heights are counted in the file."""
+        self._path, self._grid, self._datum = path, grid, datum
 
     def __enter__(self) -> PointWriter:
         """Open the file."""
+        grid = self._grid
         header = laspy.LasHeader(point_format=7, version="1.4")
-        header.scales = np.full(3, _SCALE)
-        header.offsets = np.array([np.floor(self._grid.west), np.floor(self._grid.north), 0.0])
-        header.add_crs(CRS.from_user_input(self._grid.crs))
+        # Whole numbers of 32 bits reach over 2e9 steps: the finest that the extent allows, so that cells stay on their lattice.
+        extent = max(grid.width * grid.cell, grid.height * grid.step_north)
+        fine = next(s for s in (_FINEST, 1e-3, 1e-2) if extent / s < 2**31 or s == 1e-2)
+        header.scales = np.array([fine, fine, _FINEST])
+        header.offsets = np.array([np.floor(grid.west), np.floor(grid.north), np.floor(self._datum)])
+        header.add_extra_dims(
+            [
+                laspy.ExtraBytesParams("sigma", "float32", "sigma of matching, m"),
+                laspy.ExtraBytesParams("views", "uint8", "photographs"),
+            ]
+        )
+        header.add_crs(CRS.from_user_input(grid.crs))
+        header.system_identifier = "image matching"
+        header.generating_software = f"Strandline {__version__}"
         remove_abandoned(self._path)
         self._whole = whole(self._path)
         part = self._whole.__enter__()
@@ -50,18 +80,18 @@ class PointWriter:
         self._header = header
         return self
 
-    def write(self, column: int, row: int, height: NDArray[np.float32], colour: NDArray[np.uint8]) -> None:
-        """Add the cells of a patch that have a height; ``colour`` is (rows, columns, 3 or 4)."""
-        r, c = np.nonzero(np.isfinite(height))
+    def write(self, column: int, row: int, cells: Cells) -> None:
+        """Add the cells of a patch that have a height."""
+        r, c = np.nonzero(np.isfinite(cells.height))
         if not len(r):
             return
         record = laspy.ScaleAwarePointRecord.zeros(len(r), header=self._header)
-        record.x = self._grid.west + (column + c + 0.5) * self._grid.cell
-        record.y = self._grid.north - (row + r + 0.5) * self._grid.cell
-        record.z = height[r, c].astype(float)
-        shade = colour[r, c].astype(np.uint16) * 257
-        record.red, record.green, record.blue = shade[:, 0], shade[:, 1], shade[:, 2]
+        record.x, record.y = self._grid.centres(row + r, column + c)
+        record.z = cells.height[r, c].astype(float)
+        record.red, record.green, record.blue = (cells.colour[r, c, k] for k in range(3))
         record.return_number[:], record.number_of_returns[:] = 1, 1
+        record["sigma"], record["views"] = cells.sigma[r, c], cells.views[r, c]
+        record.synthetic[:] = cells.filled[r, c]
         self._file.write_points(record)
 
     def __exit__(self, kind: Any, error: Any, trace: Any) -> None:

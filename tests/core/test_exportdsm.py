@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -19,12 +20,12 @@ from scipy.spatial.transform import Rotation
 from strandline.core.block import View
 from strandline.core.camera import Camera
 from strandline.core.contract import VectorSource, encode
-from strandline.core.errors import InputError, NotEnoughData
+from strandline.core.errors import InputError
 from strandline.core.files import file_digest
 from strandline.core.frames import LocalFrame
 from strandline.core.georef import FOLDER, Georef
 from strandline.core.progress import Progress, Silent
-from strandline.core.surface import exportdsm, mosaic
+from strandline.core.surface import exportdsm, mosaic, work
 from strandline.core.surface.exportdsm import Request, run
 from strandline.core.survey import Photograph, Survey
 from strandline.core.vector import write_layer
@@ -293,10 +294,23 @@ def test_points_are_the_cells(surface):
     assert cloud.header.parse_crs().to_epsg() == 32630
 
 
+def test_the_points_left_out_confirm_the_surface(scene, surface):
+    """Tie points on the true ground: the surface lies on them as well as on the truth, and the report says so."""
+    page = (scene.folder / "report" / "exportdsm.html").read_text()
+    median, nmad = (
+        float(re.search(rf"tie points, {name} \(m\)</td><td class=\"n\">([^<]*)<", page)[1]) for name in ("median", "NMAD")
+    )
+    limit = np.sqrt(2) * 0.1 * GSD * HEIGHT / BASE
+    assert abs(median) < 0.3 * limit
+    assert 0.0 < nmad < limit
+
+
 def test_tags_carry_the_georeferencing(scene, surface):
     result, _ = surface
     with rasterio.open(result.output) as file:
         tags = file.tags()
+        assert file.units == ("m",)
+    assert tags["VERTICAL_DATUM"] == "unknown"
     data = json.loads(tags["STRANDLINE_GEOREFERENCING"])
     assert data["pivot"] == [0.0, 0.0, 0.0]
     assert len(data["covariance"]) == 49
@@ -318,7 +332,7 @@ def test_a_second_run_under_the_same_parameters_is_at_once(scene, surface, monke
     def refuse(*_):
         raise AssertionError("matched again")
 
-    monkeypatch.setattr(exportdsm, "_match", refuse)
+    monkeypatch.setattr(exportdsm, "compute_levels", refuse)
     assert run(request(scene.folder, out)) == result
 
 
@@ -338,11 +352,6 @@ class StopsAt(Silent):
 def small_tiles(monkeypatch, core=64, overlap=24):
     """Cut into small tiles, so that a small area has many."""
     monkeypatch.setattr(exportdsm, "tiles", lambda level: mosaic.tiles(level, core, overlap))
-    from strandline.core.surface import bands, finish
-
-    for module in (bands, finish):
-        monkeypatch.setattr(module, "Mosaic", lambda scratch, level, *_: mosaic.Mosaic(scratch, level, core, overlap))
-    monkeypatch.setattr(finish, "tiles", lambda level: mosaic.tiles(level, core, overlap))
 
 
 def test_tiles_leave_no_seams(scene, surface, fresh, tmp_path, monkeypatch):
@@ -370,6 +379,7 @@ def test_workers_make_no_difference(fresh, tmp_path, monkeypatch):
     square = shapely.box(EASTING - 6.4, NORTHING - 0.6, EASTING + 6.4, NORTHING + 0.6)
     write_layer(str(tmp_path / "area.gpkg"), "area", CRS, {}, [square], "Polygon")
     area = VectorSource(str(tmp_path / "area.gpkg"), "area", CRS)
+    monkeypatch.setattr(work, "_POOL", 2)
     monkeypatch.setattr(exportdsm, "_POOL", 2)
     files = []
     for workers in (1, 2):
@@ -386,10 +396,10 @@ def test_a_stopped_run_goes_on_where_it_was(surface, fresh, tmp_path, monkeypatc
         run(request(fresh, tmp_path / "out"), Progress(StopsAt(0.5)))
     assert not (tmp_path / "out" / "dsm.tif").exists()
     assert Survey.open(fresh).record("exportdsm") is None
-    kept = {path: path.stat().st_mtime_ns for path in (fresh / "dense").rglob("*.npz")}
+    kept = {path: path.stat().st_mtime_ns for path in (fresh / "dense").rglob("level*/*.npz")}
     assert len(kept) > 5
     done = []
-    original = exportdsm.match_tile
+    original = work.match_tile
 
     def watched(plan, tile):
         standing = tile.path(plan.scratch).is_file()
@@ -398,12 +408,12 @@ def test_a_stopped_run_goes_on_where_it_was(surface, fresh, tmp_path, monkeypatc
         if standing:
             assert tile.path(plan.scratch).stat().st_mtime_ns == kept[tile.path(plan.scratch)]
 
-    monkeypatch.setattr(exportdsm, "match_tile", watched)
+    monkeypatch.setattr(work, "match_tile", watched)
     result = run(request(fresh, tmp_path / "out"))
     assert sum(done) == len(kept)
     assert not (fresh / "dense").exists()
     # As if it had never been stopped.
-    monkeypatch.setattr(exportdsm, "match_tile", original)
+    monkeypatch.setattr(work, "match_tile", original)
     other = run(request(fresh, tmp_path / "other"))
     assert read(result.output).tobytes() == read(other.output).tobytes()
 
@@ -452,7 +462,7 @@ def test_area_ignore_and_fill(scene, fresh, tmp_path):
     # A surface without a single height is none: it is told, and what stood stays.
     write_layer(str(tmp_path / "all.gpkg"), "all", crs, {}, [area_box.buffer(1)], "Polygon")
     standing = Path(result.output).read_bytes()
-    with pytest.raises(NotEnoughData, match="No cell of the area has a height"):
+    with pytest.raises(InputError, match="IGNORE covers all"):
         run(request(fresh, tmp_path / "out", area=area, ignore=VectorSource(str(tmp_path / "all.gpkg"), "all", crs)))
     assert Path(result.output).read_bytes() == standing
     assert not list(Path(result.output).parent.glob(".part-*"))
@@ -470,6 +480,9 @@ def test_area_ignore_and_fill(scene, fresh, tmp_path):
         ({"resolution": 5.0}, "RESOLUTION"),
         ({"output": "dsm.png"}, ".tif"),
         ({"points": "points.txt"}, ".laz"),
+        ({"ortho_depth": "12"}, "ORTHO_DEPTH=12"),
+        ({"fill": 5000.0}, "FILL=5000"),
+        ({"fill": float("nan")}, "FILL=nan"),
     ],
 )
 def test_bad_parameters_cost_nothing(scene, surface, tmp_path, options, told):
@@ -477,6 +490,15 @@ def test_bad_parameters_cost_nothing(scene, surface, tmp_path, options, told):
     with pytest.raises(InputError, match=told):
         run(replace(request(scene.folder, tmp_path / "out"), **options))
     assert (scene.folder / "survey.json").read_bytes() == before
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_photograph_of_another_size_is_named(fresh, tmp_path, scene):
+    survey = Survey.open(fresh)
+    first, *others = survey.photographs
+    Survey.create(fresh, survey.images, scene.frame.crs, [replace(first, width=720), *others])
+    with pytest.raises(InputError, match=rf"{first.name} has 720 x 300 pixels but was oriented with 360 x 300"):
+        run(request(fresh, tmp_path / "out"))
     assert list((tmp_path / "out").iterdir()) == []
 
 

@@ -60,6 +60,50 @@ def test_a_flat_or_empty_raster_is_drawn_too(qgis, tmp_path, values):
         assert found[0] < found[-1]
 
 
+def test_correlation_and_precision_start_where_they_mean_something(qgis, tmp_path):
+    from strandline.algorithms import styles
+
+    make_raster(tmp_path / "c.tif", [[0.4] * 20, [0.8] * 20])
+    assert [item.value for item in ramp(drawn(tmp_path / "c.tif", styles.CORRELATION))] == pytest.approx([0, 0.25, 0.5, 0.75, 1])
+    found = [item.value for item in ramp(drawn(tmp_path / "c.tif", styles.PRECISION))]
+    assert found[0] == 0.0
+    assert found[-1] == pytest.approx(0.8, abs=0.01)
+
+
+def test_counts_and_filled_cells_are_classes(qgis, tmp_path):
+    from strandline.algorithms import styles
+
+    make_raster(tmp_path / "n.tif", [[1.0] * 4, [8.0] * 4, [200.0] * 4])
+    layer = drawn(tmp_path / "n.tif", styles.VIEWS)  # owns its renderer
+    classes = {c.value: c for c in layer.renderer().classes()}
+    assert classes[8].label == "8 and more"
+    assert classes[200].color == classes[8].color != classes[1].color
+    layer = drawn(tmp_path / "n.tif", styles.FILLED)
+    classes = {c.value: c for c in layer.renderer().classes()}
+    assert classes[0].color.alpha() == 0
+    assert classes[1].color.alpha() == 255
+
+
+@pytest.mark.parametrize(("bits", "white"), [(8, 255.0), (16, 65535.0)])
+def test_an_orthophoto_is_drawn_as_it_is(qgis, tmp_path, bits, white):
+    from osgeo import gdal
+    from qgis.core import QgsMultiBandColorRenderer
+    from strandline.algorithms import styles
+
+    kind = gdal.GDT_Byte if bits == 8 else gdal.GDT_UInt16
+    data = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "o.tif"), 4, 4, 4, kind, ["PHOTOMETRIC=RGB", "ALPHA=YES"])
+    data.SetGeoTransform((500000, 1, 0, 5000000, 0, -1))
+    for band in range(1, 5):
+        data.GetRasterBand(band).Fill(white / 2)
+    del data
+    layer = drawn(tmp_path / "o.tif", styles.PICTURE)  # owns its renderer
+    renderer = layer.renderer()
+    assert isinstance(renderer, QgsMultiBandColorRenderer)
+    assert (renderer.redBand(), renderer.greenBand(), renderer.blueBand(), renderer.alphaBand()) == (1, 2, 3, 4)
+    assert renderer.blueContrastEnhancement().maximumValue() == white
+    assert renderer.blueContrastEnhancement().minimumValue() == 0.0
+
+
 def test_residuals_are_arrows_of_a_centimetre_at_most(qgis):
     from qgis.core import QgsFeature, QgsGeometry, QgsVectorLayer
     from strandline.algorithms import styles
@@ -135,4 +179,4 @@ def test_a_result_that_is_to_be_loaded_gets_its_style(algorithm, fake_engine, tm
     assert results["OUTPUT"] == str(dsm)
     assert set(context.layersToLoadOnCompletion()) == {str(dsm), str(precision)}
     assert context.layerToLoadOnCompletionDetails(str(dsm)).postProcessor() is styles.TERRAIN
-    assert context.layerToLoadOnCompletionDetails(str(precision)).postProcessor() is styles.SEQUENTIAL
+    assert context.layerToLoadOnCompletionDetails(str(precision)).postProcessor() is styles.PRECISION
