@@ -32,10 +32,11 @@ _AXIS = 1e-9  # rotation (per cell) below which a raster counts as north-up
 
 @dataclass(frozen=True)
 class Aligned:
-    """A model seen through the common grid."""
+    """A model seen through the common grid; ``offset`` (m to the east and north in the grid's CRS) is where it is read beside it."""
 
     heights: Heights
     grid: Grid
+    offset: tuple[float, float] = (0.0, 0.0)
 
     @cached_property
     def points(self) -> int:
@@ -52,7 +53,7 @@ class Aligned:
         columns, rows = _lattice(window.width), _lattice(window.height)
         x = window.west + columns * window.cell
         y = window.north - rows * window.step_north
-        xy = np.stack(np.broadcast_arrays(x[None, :], y[:, None]), axis=-1).reshape(-1, 2)
+        xy = np.stack(np.broadcast_arrays(x[None, :], y[:, None]), axis=-1).reshape(-1, 2) + self.offset
         source = self._cells(xy).reshape(len(rows), len(columns), 2)
         out = np.full((window.height, window.width), np.nan)
         if not np.isfinite(source).all():

@@ -43,6 +43,10 @@ class Sigma:
             return np.full((window.height, window.width), self.common)
         return np.asarray(np.hypot(_one(self.before, window), _one(self.after, window)))
 
+    def moved(self, offset: tuple[float, float]) -> Sigma:
+        """Return the same for AFTER read beside its place."""
+        return replace(self, after=replace(self.after, offset=offset)) if isinstance(self.after, Aligned) else self
+
 
 @dataclass(frozen=True)
 class Pair:
@@ -56,6 +60,10 @@ class Pair:
     def grid(self) -> Grid:
         """The common grid."""
         return self.before.grid
+
+    def moved(self, offset: tuple[float, float]) -> Pair:
+        """Return the same with AFTER read ``offset`` (m to the east and north) beside its place."""
+        return replace(self, after=replace(self.after, offset=offset))
 
     def tiles(self, halo: int = 0) -> list[tuple[int, int, int, int]]:
         """Return the grid's tiles, sized by what must be read for one."""
@@ -156,14 +164,14 @@ def difference(
     small = (-(-grid.height // thinning), -(-grid.width // thinning))
     outcome = Outcome([Tally(float(shapely.area(s))) for s in shapes], np.full(small, np.nan), np.full(small, np.nan), thinning)
     tree = shapely.STRtree(shapes)
-    halo = HALO if method == "coherent" and sigma is not None else 0
+    halo = HALO if method == "coherent" and sigma is not None else 1  # slopes look one cell further
     with ExitStack() as files:
         whole = files.enter_context(CogWriter(output, grid, names=("change",), tags=tags))
         kept_file = (
             files.enter_context(CogWriter(significant, grid, names=("significant change",), tags=tags)) if significant else None
         )
         for column, row, width, height in progress.over(pair.tiles(halo)):
-            around, inner = _with_halo(grid, column, row, width, height, halo)
+            around, inner = with_halo(grid, column, row, width, height, halo)
             change, before = pair.change(around)
             _thin(outcome.height, thinning, column, row, before[inner])
             if np.isnan(change[inner]).all():
@@ -177,12 +185,13 @@ def difference(
                 kept = rule(change, detection, confidence)[inner] & np.isfinite(change[inner])
                 spread = spread[inner]
                 outcome.without_sigma += int(np.count_nonzero(np.isfinite(change[inner]) & ~np.isfinite(spread)))
+            after = _ringed(before + change, inner)
             change, before = change[inner], before[inner]
             whole.write(Patch(column, row, change[None]))
             if kept_file is not None and kept is not None:
                 kept_file.write(Patch(column, row, np.where(kept, change, np.nan)[None]))
             window = grid.window(column, row, width, height)
-            tile = Cells(window, row * grid.width + column, grid.width, change, spread, kept, before)
+            tile = Cells(window, row * grid.width + column, grid.width, change, spread, kept, before, after)
             for i in tree.query(shapely.box(*window.bounds)):
                 found = cell_shares(shapes[i], window)
                 if found is not None:
@@ -209,12 +218,20 @@ def _one(source: Aligned | float | None, window: Grid) -> Array:
     return np.full((window.height, window.width), np.nan if source is None else source)
 
 
-def _with_halo(grid: Grid, column: int, row: int, width: int, height: int, halo: int) -> tuple[Grid, tuple[slice, slice]]:
+def with_halo(grid: Grid, column: int, row: int, width: int, height: int, halo: int) -> tuple[Grid, tuple[slice, slice]]:
     """Return the window with its halo, cut at the grid's edges, and where the window lies in it."""
     left, top = min(halo, column), min(halo, row)
     right, bottom = min(halo, grid.width - column - width), min(halo, grid.height - row - height)
     around = grid.window(column - left, row - top, width + left + right, height + top + bottom)
     return around, (slice(top, top + height), slice(left, left + width))
+
+
+def _ringed(values: Array, inner: tuple[slice, slice]) -> Array:
+    """Return the ``inner`` part of values with one cell around it, NaN where the grid ends."""
+    rows, columns = inner
+    missing = [(int(part.start == 0), int(part.stop == size)) for part, size in zip(inner, values.shape, strict=True)]
+    part = values[max(rows.start - 1, 0) : rows.stop + 1, max(columns.start - 1, 0) : columns.stop + 1]
+    return np.pad(part, missing, constant_values=np.nan) if any(map(any, missing)) else part
 
 
 def _shift_on(shift: Shift, window: Grid, height: Array) -> Array:

@@ -20,6 +20,7 @@ from .errormodel import error_model, height_error, systematic_error
 from .georeferencing import require_one_reference
 from .heard import Heard
 from .heights import Heights, open_heights
+from .planshift import PlanShift, WithPlan, plan_shift
 from .report import Findings, write_report
 from .units import true_area
 from .validation import validate
@@ -48,6 +49,7 @@ class Request:
     ignore: VectorSource | None = None
     coregister: Literal["auto", "none", "vertical", "plane", "horizontal"] = "auto"
     registration_sigma: float | None = None
+    horizontal_sigma: float | None = None
     correlation_range: float | None = None
     lod: Literal["cell", "uniform", "coherent"] = "cell"
     confidence: float = 0.95
@@ -117,11 +119,16 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             if precision:
                 files.enter_context(precision)
         sigma = _given_sigma(request, pair, precisions)
-        ground = stable_ground(pair, stable, sigma, progress.part(0.25, 0.4)) if stable else None
+        ground = stable_ground(pair, stable, sigma, progress.part(0.25, 0.3)) if stable else None
+        first = None if ground is None else ground.change
+        plan = plan_shift(request.coregister, pair, stable, request.horizontal_sigma, progress.part(0.3, 0.36))
+        if plan is not None and plan.moved:
+            pair = pair.moved(plan.applied)
+            sigma = None if sigma is None else sigma.moved(plan.applied)
+            ground = stable_ground(pair, stable, sigma, progress.part(0.36, 0.4))
         shift, known = height_error(_method(request), ground, (before, after), grid, zones, progress)
-        if ground is not None and len(ground.change):
-            ground_after = ground.change - shift.at(ground.x, ground.y, ground.height)
-            stats = statistics(ground.change), statistics(ground_after)
+        if ground is not None and first is not None and len(ground.change):
+            stats = statistics(first), statistics(ground.change - shift.at(ground.x, ground.y, ground.height))
             if sigma is None:
                 sigma = Sigma(common=stats[1].nmad)
         else:
@@ -143,6 +150,8 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         expected = known.shift if known else shift
         model, variogram = error_model(request.correlation_range, ground, expected, sigma is not None, steps, progress)
         systematic = systematic_error(request.registration_sigma, shift, known)
+        if plan is not None and known is not None:
+            systematic = WithPlan(systematic, plan, 0 if shift.method == "none" else 1 if shift.method == "vertical" else 3)
 
         shapes = [zone.shape for zone in zones]
         whole = union(zones) if len(zones) > 1 else shapes[0]
@@ -156,7 +165,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             confidence=request.confidence,
             output=request.output,
             significant=request.significant,
-            tags=_tags(request, shift),
+            tags=_tags(request, shift, plan),
             progress=progress.part(0.4, 0.95),
         )
     if outcome.moved == 0:
@@ -186,6 +195,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
                 method=request.lod,
                 shift=shift,
                 known=known,
+                plan=plan,
                 stable=stats,
                 model=model,
                 variogram=variogram,
@@ -237,12 +247,13 @@ def _sigma_words(request: Request, sigma: Sigma | None) -> str:
     return f"{sigma.common:.4f} m for the difference, the NMAD of stable ground"
 
 
-def _tags(request: Request, shift: Shift) -> dict[str, str]:
+def _tags(request: Request, shift: Shift, plan: PlanShift | None) -> dict[str, str]:
+    moved = f"in plan {plan.applied[0]:+.3f}, {plan.applied[1]:+.3f} m; " if plan and plan.moved else ""
     return {
         "STRANDLINE_BEFORE": Path(request.before.path).name,
         "STRANDLINE_AFTER": Path(request.after.path).name,
         "STRANDLINE_DIFFERENCE": "after minus before, metres",
-        "STRANDLINE_COREGISTRATION": f"{shift.method}: {shift.describe()}",
+        "STRANDLINE_COREGISTRATION": f"{moved}{shift.method}: {shift.describe()}",
     }
 
 

@@ -40,7 +40,7 @@ class HeightError:
 
     ``stable`` is the plane of stable ground with its covariance (3, 3), ``prior`` the georeferencings' covariance (7, 7).
     ``covariance`` is None when it is not known. ``free`` says that a tilt is neither known nor in the covariance, ``bends`` that
-    both georeferencings know how far they may be bent.
+    both georeferencings know how far they may be bent, ``taken`` that its shift is worth taking off, and not its level alone.
     """
 
     shift: Shift
@@ -49,6 +49,7 @@ class HeightError:
     prior: Array | None = None
     free: bool = False
     bends: bool = False
+    taken: bool = True
 
     def left_by(self, applied: Shift) -> tuple[float, ...]:
         """Return the coefficients (p,) of what is expected to remain when ``applied`` is taken off; none for its own shift."""
@@ -117,8 +118,8 @@ def from_both(ground: Stable, prior: Georeferenced, steps: tuple[float, float], 
 def from_stable(ground: Stable, level: Shift, zones: list[Zone], steps: tuple[float, float], progress: Progress) -> HeightError:
     """Return what stable ground alone tells: a plane when its tilt is significant, else the ``level`` fitted to it.
 
-    The test is Fisher's, with the effective number of cells. A tilt that is not seen is left out of the covariance: where stable
-    ground could not see one that matters in the ``zones``, ``free`` says so.
+    The test is Fisher's, with the effective number of cells. A tilt that is not significant is not taken off, but what stable
+    ground says of it stays known, and counts. ``free`` says that ground on one line tells nothing of the tilt across.
     """
     centre = _centre(ground)
     seen = _observe(ground, centre, None, steps)
@@ -137,15 +138,19 @@ def from_stable(ground: Stable, level: Shift, zones: list[Zone], steps: tuple[fl
     variogram = _variogram(ground, level, steps)
     if variogram is None:
         return HeightError(level, None, free=True)
-    error = HeightError(level, _covariance(ground, np.ones((len(ground.x), 1)), variogram), _plane(seen, centre))
+    plane, covariance = _plane(seen, centre)
+    if tilts == 0:
+        plane, covariance = level, _covariance(ground, np.ones((len(ground.x), 1)), variogram)
+    error = HeightError(plane, covariance, _plane(seen, centre), free=tilts < 2, taken=False)
     axis = _unseen(seen, centre, zones)
     if axis is None:
         return error
-    progress.warn(
-        f"STABLE does not reach far enough {axis} to tell a tilt of one model against the other in that direction: that tilt is "
-        "not known and NET_SIGMA leaves it out unless REGISTRATION_SIGMA is given; add stable ground there."
-    )
-    return HeightError(level, error.covariance, error.stable, free=True)
+    told = f"STABLE does not reach far enough {axis} to tell a tilt of one model against the other in that direction"
+    if tilts < 2:
+        progress.warn(f"{told}: NET_SIGMA leaves it out unless REGISTRATION_SIGMA is given; add stable ground there.")
+    else:
+        progress.warn(f"{told}, which makes NET_SIGMA large: add stable ground there.")
+    return error
 
 
 def from_plane(ground: Stable, plane: Shift, steps: tuple[float, float]) -> HeightError:
@@ -232,11 +237,11 @@ def _unseen(seen: _Observation, centre: tuple[float, ...], zones: list[Zone]) ->
     for i in (1, 0):  # the shorter axis is the likelier one
         reach = float(np.abs(offsets @ axes[i]).max())
         if known.get(i, np.inf) * reach > _FREE * level:
-            return _direction(axes[i])
+            return direction(axes[i])
     return None
 
 
-def _direction(axis: Array) -> str:
+def direction(axis: Array) -> str:
     """Return an axis (east, north) as words."""
     names = ("from west to east", "from south-west to north-east", "from south to north", "from north-west to south-east")
     return names[round(float(np.degrees(np.arctan2(axis[1], axis[0]))) % 180.0 / 45.0) % 4]

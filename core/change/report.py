@@ -16,6 +16,7 @@ from .coregistration import Shift, Statistics
 from .difference import Outcome
 from .heighterror import HeightError
 from .heights import Heights
+from .planshift import PlanShift
 from .significance import coverage_factor
 from .terms import BENT_AT, COUNT, IN_METRES
 from .uncertainty import ErrorModel
@@ -41,6 +42,7 @@ class Findings:
     method: str
     shift: Shift
     known: HeightError | None
+    plan: PlanShift | None
     stable: tuple[Statistics, Statistics] | None
     model: ErrorModel
     variogram: Variogram | None

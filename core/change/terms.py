@@ -22,10 +22,14 @@ IN_METRES = np.block([[np.diag([1.0, BENT_AT, BENT_AT, BENT_AT]), np.zeros((4, 3
 
 @dataclass(frozen=True)
 class Moments:
-    """The mean terms (7,) of a zone's covered cells, weighted by their shares, about ``origin`` (x, y, z); a place by default."""
+    """The mean terms (7,) of a zone's covered cells, weighted by their shares, about ``origin`` (x, y, z); a place by default.
+
+    ``slopes`` are the cells' mean slopes to the east and north, by which a shift in plan tells.
+    """
 
     origin: tuple[float, ...]
     means: tuple[float, ...] = (1.0,) + (0.0,) * (COUNT - 1)
+    slopes: tuple[float, float] = (0.0, 0.0)
 
     def about(self, centre: tuple[float, ...]) -> Array:
         """Return the mean terms (7,) about ``centre`` (2,) or (3,)."""

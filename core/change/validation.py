@@ -16,16 +16,14 @@ def validate(request: Request) -> None:
     """Refuse, before any work, what cannot be meant."""
     if not 0.0 < request.confidence < 1.0:
         raise InputError(f"CONFIDENCE is {request.confidence:g}: give a number between 0 and 1, such as 0.95.")
-    for name in ("before_sigma", "after_sigma", "registration_sigma", "correlation_range"):
+    for name in ("before_sigma", "after_sigma", "registration_sigma", "horizontal_sigma", "correlation_range"):
         value = getattr(request, name)
         if value is not None and value < 0:
             raise InputError(f"{name.upper()} is {value:g}: give metres that are not negative.")
     for side in ("before", "after"):
         if getattr(request, f"{side}_sigma") is not None and getattr(request, f"{side}_precision") is not None:
             raise InputError(f"{side.upper()}_SIGMA and {side.upper()}_PRECISION are both given: give one of them.")
-    if request.coregister == "horizontal":
-        raise InputError("COREGISTER=horizontal is not available yet: choose auto, vertical, plane or none.")
-    if request.coregister in ("vertical", "plane") and request.stable is None:
+    if request.coregister in ("vertical", "plane", "horizontal") and request.stable is None:
         raise InputError(f"COREGISTER={request.coregister} needs STABLE: draw polygons on ground that has not moved.")
     sources = (request.before, request.after, request.before_precision, request.after_precision)
     inputs = {Path(s.path).resolve() for s in sources if s}

@@ -21,7 +21,10 @@ _HALF_NORMAL = 1.0 / np.sqrt(2.0 * np.pi)  # mean of max(0, noise) in sigmas
 
 @dataclass(frozen=True)
 class Cells:
-    """A tile's values (rows, columns): change, sigma (NaN: not known), whether significant, BEFORE's height."""
+    """A tile's values (rows, columns): change, sigma (NaN: not known), whether significant, BEFORE's height.
+
+    ``after`` (rows + 2, columns + 2) are AFTER's heights with one cell around them.
+    """
 
     grid: Grid
     first: int  # number of the tile's top-left cell in the whole grid
@@ -30,6 +33,7 @@ class Cells:
     sigma: Array | None
     significant: NDArray[np.bool_] | None
     before: Array
+    after: Array
 
 
 @dataclass(frozen=True)
@@ -107,6 +111,7 @@ class Tally:
             None  # the first cell that was met: near the zone, so that squares keep their digits
         )
         self._terms = np.zeros(COUNT)  # share-weighted sums of the height's terms about it
+        self._slopes = np.zeros(4)  # share-weighted sums of slopes east and north (per cell), and their weights
         self._detected = True
         self._cell_area = 0.0
 
@@ -120,16 +125,18 @@ class Tally:
         kept = np.zeros(change.shape, np.bool_) if tile.significant is None else tile.significant[part]
         groups = (self._net, self._down, self._up)
         limits = np.array([group.sample.limit for group in groups], np.uint64)
-        sums, others = np.zeros((3, 6)), np.zeros(10)
+        after = tile.after[row : row + shares.shape[0] + 2, column : column + shares.shape[1] + 2]
+        sums, others, slopes = np.zeros((3, 6)), np.zeros(10), np.zeros(4)
         picked = np.zeros(change.shape, np.uint8)
         first = tile.first + row * tile.stride + column
-        _gather(change, sigma, kept, before, shares, first, tile.stride, limits, sums, others, picked)
+        _gather(change, sigma, kept, before, after, shares, first, tile.stride, limits, sums, others, slopes, picked)
         corner = (*(float(v) for v in grid.centres(np.array(row), np.array(column))), 0.0)
         self._origin = self._origin or corner
         # Columns run east, rows south.
         east, south = grid.cell, -grid.step_north
         terms = others[:COUNT] * (1.0, east, south, 1.0, east * east, east * south, south * south)
         self._terms += about_another(self._origin, corner) @ terms
+        self._slopes += slopes * (1.0 / east, 1.0 / south, 1.0, 1.0)
         down, up, noise = others[COUNT:].tolist()
         self._significant_down += down
         self._significant_up += up
@@ -145,6 +152,12 @@ class Tally:
             r, c = np.nonzero(picked & (1 << bit))
             x, y = grid.centres(r + row, c + column)
             group.sample.add(first + r * tile.stride + c, x, y, shares[r, c] * sigma[r, c], count=int(count))
+
+    @property
+    def slopes(self) -> tuple[float, float]:
+        """The mean slopes of AFTER to the east and north."""
+        east, north, first, second = self._slopes.tolist()
+        return (east / first if first else 0.0, north / second if second else 0.0)
 
     @property
     def lacking(self) -> float:
@@ -165,7 +178,7 @@ class Tally:
             unknown = Parts(None, None, None)
             return Volume(None, unknown, None, unknown, None, unknown, None, None, None, self._area, 0.0)
         assert self._origin is not None
-        shift_sigma = systematic.sigma(Moments(self._origin, tuple((self._terms / weight).tolist())))
+        shift_sigma = systematic.sigma(Moments(self._origin, tuple((self._terms / weight).tolist()), self.slopes))
         fill, detected = self._fill(), self._detected
         return Volume(
             net=a * self._net.height,
@@ -200,12 +213,14 @@ def _gather(
     sigma: Array,
     kept: NDArray[np.bool_],
     before: Array,
+    after: Array,
     shares: Array,
     first: int,
     stride: int,
     limits: NDArray[np.uint64],
     sums: Array,
     others: Array,
+    slopes: Array,
     picked: NDArray[np.uint8],
 ) -> None:
     """Add cells to sums (all, falling, rising) and mark those that the samples take, a bit each.
@@ -214,6 +229,8 @@ def _gather(
 
     ``others``: weight times 1, column, row, height before, column^2, column row, row^2; then significant fall and rise, sigma of
     what is not significant.
+
+    ``slopes``: weight times rise per column and per row of ``after``, which has one cell around; the weights of both.
     """
     for r in range(change.shape[0]):
         for c in range(change.shape[1]):
@@ -244,8 +261,23 @@ def _gather(
             others[4] += w * c * c
             others[5] += w * c * r
             others[6] += w * r * r
+            for k, here in enumerate((_rise(after[r + 1, c : c + 3]), _rise(after[r : r + 3, c + 1]))):
+                if not np.isnan(here):
+                    slopes[k] += w * here
+                    slopes[2 + k] += w
             if kept[r, c]:
                 others[7] += w * max(-dh, 0.0)
                 others[8] += w * max(dh, 0.0)
             elif known:
                 others[9] += s
+
+
+@njit(cache=True, inline="always")  # pragma: no cover
+def _rise(three: Array) -> float:
+    """Return the rise per cell at the middle one of three heights, from what is known of them; NaN of one alone."""
+    before, here, after = three
+    if np.isnan(before):
+        return after - here
+    if np.isnan(after):
+        return here - before
+    return (after - before) / 2.0
