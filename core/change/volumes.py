@@ -23,7 +23,7 @@ _HALF_NORMAL = 1.0 / np.sqrt(2.0 * np.pi)  # mean of max(0, noise) in sigmas
 class Cells:
     """A tile's values (rows, columns): change, sigma (NaN: not known), whether significant, BEFORE's height.
 
-    ``after`` (rows + 2, columns + 2) are AFTER's heights with one cell around them.
+    ``after`` (rows + 2, columns + 2) are AFTER's heights with one cell around them; None when no shift in plan is asked for.
     """
 
     grid: Grid
@@ -33,7 +33,7 @@ class Cells:
     sigma: Array | None
     significant: NDArray[np.bool_] | None
     before: Array
-    after: Array
+    after: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,10 @@ class Tally:
         kept = np.zeros(change.shape, np.bool_) if tile.significant is None else tile.significant[part]
         groups = (self._net, self._down, self._up)
         limits = np.array([group.sample.limit for group in groups], np.uint64)
-        after = tile.after[row : row + shares.shape[0] + 2, column : column + shares.shape[1] + 2]
+        if tile.after is None:
+            after = np.full((shares.shape[0] + 2, shares.shape[1] + 2), np.nan)
+        else:
+            after = tile.after[row : row + shares.shape[0] + 2, column : column + shares.shape[1] + 2]
         sums, others, slopes = np.zeros((3, 6)), np.zeros(10), np.zeros(4)
         picked = np.zeros(change.shape, np.uint8)
         first = tile.first + row * tile.stride + column

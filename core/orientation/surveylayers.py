@@ -150,7 +150,7 @@ def _write_photographs(
     for i, photograph in enumerate(photographs):
         small.append(thumbnail(survey, photograph))
         progress.at((i + 1) / len(photographs))
-    fields = {
+    fields: dict[str, Any] = {
         "name": [p.name for p in photographs],
         "time": [p.time for p in photographs],
         "height": places[:, 2],

@@ -102,7 +102,9 @@ class Simulator:
         self.zones = {name: shapely.transform(shape, lambda xy: xy + (WEST, NORTH)) for name, shape in ZONES.items()}
         self._layer("zones", list(self.zones.values()), {"name": list(self.zones)})
         for name, shapes in STABLE.items():
-            self._layer(name, [shapely.transform(s, lambda xy: xy + (WEST, NORTH)) for s in shapes], {"id": list(range(len(shapes)))})
+            self._layer(
+                name, [shapely.transform(s, lambda xy: xy + (WEST, NORTH)) for s in shapes], {"id": list(range(len(shapes)))}
+            )
         self.shares = []
         for shape in [*self.zones.values(), shapely.union_all(list(self.zones.values()))]:
             row, column, part = cell_shares(shape, self.grid) or (0, 0, np.zeros((0, 0)))
