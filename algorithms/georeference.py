@@ -57,6 +57,15 @@ class Georeference(StepAlgorithm):
             "RESIDUALS", tr("Residuals"), tr("The ground points with their residuals in metres, drawn as arrows.")
         )
         yield ask.point_output("PHOTOS", tr("Camera positions"), tr("Where each photograph was taken from, as computed."))
+        yield ask.file_output(
+            "TIE_POINTS",
+            tr("Tie points (point cloud)"),
+            tr(
+                "The tie points as a LAZ file in the survey's CRS. After an adjustment each has its own predicted sigma in east, "
+                "north and height (sigma_e, sigma_n, sigma_u; m), georeferencing included."
+            ),
+            filters=tr("LAZ files (*.laz)"),
+        )
         yield ask.report()
 
     def checkParameterValues(self, parameters: Dict[str, Any], context: QgsProcessingContext) -> Tuple[bool, str]:

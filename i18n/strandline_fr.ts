@@ -672,6 +672,14 @@
    <translation>D'où chaque photographie a été prise, selon le calcul.</translation>
   </message>
   <message>
+   <source>Tie points (point cloud)</source>
+   <translation>Points de liaison (nuage de points)</translation>
+  </message>
+  <message>
+   <source>The tie points as a LAZ file in the survey's CRS. After an adjustment each has its own predicted sigma in east, north and height (sigma_e, sigma_n, sigma_u; m), georeferencing included.</source>
+   <translation>Les points de liaison dans un fichier LAZ, dans le SCR du levé. Après une compensation, chacun porte son propre écart-type prévu en est, nord et hauteur (sigma_e, sigma_n, sigma_u ; m), géoréférencement compris.</translation>
+  </message>
+  <message>
    <source>Nothing to georeference with: give GCPS with MARKS, GCP_FILE, or USE_GNSS.</source>
    <translation>Rien pour géoréférencer : donnez GCPS avec MARKS, GCP_FILE, ou USE_GNSS.</translation>
   </message>
@@ -894,10 +902,6 @@
   <message>
    <source>incremental: photograph by photograph; global: all at once, quicker on large blocks; auto chooses.</source>
    <translation>incremental : photographie par photographie ; global : toutes à la fois, plus rapide sur de grands blocs ; auto choisit.</translation>
-  </message>
-  <message>
-   <source>Tie points (point cloud)</source>
-   <translation>Points de liaison (nuage de points)</translation>
   </message>
   <message>
    <source>The oriented tie points as a LAZ file, in the free frame.</source>

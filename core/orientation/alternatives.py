@@ -75,7 +75,8 @@ def _similarities(
     block: Block, solution: Solution, gnss: Gnss, choices: Sequence[Sequence[str]], checks: Sequence[int]
 ) -> Iterator[Alternative]:
     """Yield the similarity on each choice of control points, on GNSS too where these are fewer than three."""
-    for names in choices:
+    meet = {s.point.name for s in solution.seen if s.found is not None}  # a point with one mark is no use to a similarity
+    for names in dict.fromkeys(tuple(name for name in choice if name in meet) for choice in choices):
         solver = Solver(block, solution.seen, gnss, solution.frame)
         solver.with_gnss = len(names) < 3
         if solver.with_gnss and not len(gnss):
@@ -91,7 +92,7 @@ def _similarities(
         predicted = [np.sqrt(np.diag(solver.predicted(solved, i))) for i in checks]
         numbers = [plani(errors), alti(errors)] if checks else [None, None]
         numbers += [plani(np.array(predicted)), alti(np.array(predicted))] if checks else [None, None]
-        yield Alternative("similarity", len(names), tuple(names), *numbers)
+        yield Alternative("similarity", len(names), names, *numbers)
 
 
 def _judged(

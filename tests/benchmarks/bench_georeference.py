@@ -105,11 +105,17 @@ def drawn(seeds: range) -> None:
 
 
 def attainable(scene: Scene) -> None:
-    """Print what a perfect adjustment leaves at surveyed check points: their own survey and marks."""
+    """Print what the check points' own survey and marks leave, and what the covariance of the adjustment predicts beside it.
+
+    With weights that are true the latter is the bound of Cramer and Rao: no unbiased adjustment of the same data does better.
+    """
     flight = flown(scene)
     check = np.array([p.check for p in flight.points])
-    own = rms(flight.adjusted().sigmas[check])
-    print(f"attainable at surveyed check points: {np.hypot(*own[:2]) / GSD:.2f} plan, {own[2] / GSD:.2f} height")
+    solution = flight.adjusted()
+    assert solution.predicted is not None
+    for label, sigma in (("their survey and marks alone", solution.sigmas), ("predicted, the bound", solution.predicted)):
+        own = rms(sigma[check])
+        print(f"at surveyed check points, {label}: {np.hypot(*own[:2]) / GSD:.3f} plan, {own[2] / GSD:.3f} height")
 
 
 def fixed(seeds: range) -> None:

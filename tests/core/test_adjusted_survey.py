@@ -1,12 +1,13 @@
 """Georeferencing a survey on disk by adjustment: what it writes, refuses and repeats."""
 
 import cv2  # noqa: F401 - before pycolmap
+import laspy
 import numpy as np
 import pycolmap
 import pytest
 import shapely
 from strandline.core.contract import VectorSource
-from strandline.core.errors import InputError
+from strandline.core.errors import InputError, NotEnoughData
 from strandline.core.georef import FOLDER, Georef
 from strandline.core.orientation import bundle
 from strandline.core.orientation.calibration import read_calibration
@@ -121,6 +122,53 @@ def test_two_control_points_and_positions_are_enough(tmp_path):
     assert np.abs(np.median(scene.errors(), axis=0)).max() < 0.03
     assert result.plani_gnss == pytest.approx(np.hypot(0.8, 0.5), abs=0.06)
     assert "the GNSS positions are all off by" in scene.report()
+
+
+def test_a_single_mark_takes_part_and_is_told(tmp_path):
+    scene = noisy(Scene(tmp_path, gnss_noise=0.03, gnss_sigma=0.03))
+    for name in ("middle", "west"):
+        first, *_ = [m for m in scene.marks if m[0] == name]
+        scene.marks = [m for m in scene.marks if m[0] != name] + [first]
+    result = adjusted(scene, check="west")
+    assert (result.control_count, result.check_count) == (5, 0)
+    assert "middle has one mark, which takes part" in scene.report()
+    assert "west is not used: it has 1 mark" in scene.report()  # a check point with one ray has no place to check
+    residuals = read_layer(VectorSource(str(tmp_path / "residuals.gpkg"), "residuals"))
+    roles = dict(zip(residuals.text("name"), residuals.text("role"), strict=True))
+    assert (roles["middle"], roles["west"]) == ("control, one mark", "check, not used")
+
+
+def test_nothing_but_single_marks_needs_positions(tmp_path):
+    scene = noisy(Scene(tmp_path, gnss_noise=0.03, gnss_sigma=0.03))
+    scene.marks = [next(m for m in scene.marks if m[0] == name) for name in ("north west", "south east")]
+    result = adjusted(scene, ["north west", "south east"])
+    assert result.control_count == 2
+    assert result.plani_control is None
+    with pytest.raises(NotEnoughData, match="None of the 2 control points"):
+        adjusted(scene, ["north west", "south east"], gnss=False)
+
+
+def test_each_tie_point_is_written_with_its_sigma(tmp_path):
+    """In the CRS, at the places of georeferenced/; without an adjustment no sigma is made up."""
+    scene = noisy(Scene(tmp_path, gnss_noise=0.03, gnss_sigma=0.03))
+    cloud = str(tmp_path / "ties.laz")
+    result = adjusted(scene, tie_points=cloud)
+    assert result.tie_points == cloud
+    written = laspy.read(cloud)
+    model = pycolmap.Reconstruction(tmp_path / "survey" / FOLDER)
+    local = np.array([model.points3D[key].xyz for key in sorted(model.points3D)])
+    places = Georef.read(Survey.open(tmp_path / "survey")).frame.to_crs(local)
+    assert np.asarray(written.xyz) == pytest.approx(places, abs=1e-5)
+    assert written.header.parse_crs().to_epsg() == int(UTM.split(":")[1])
+    sigmas = np.column_stack([written[f"sigma_{axis}"] for axis in "enu"])
+    assert np.all((sigmas[:, 2] > 0.1 * PIXEL) & (sigmas[:, 2] < 20 * PIXEL))
+    fewest, most = written.user_data.min(), written.user_data.max()
+    assert np.median(sigmas[written.user_data == fewest, 2]) > np.median(sigmas[written.user_data == most, 2])
+    assert "Each tie point in the colour of its own predicted sigma" in scene.report()
+    run(scene.request(method="similarity", tie_points=cloud))
+    assert [d.name for d in laspy.read(cloud).point_format.extra_dimensions] == ["residual"]
+    with pytest.raises(InputError, match="must be LAS or LAZ"):
+        adjusted(scene, tie_points=str(tmp_path / "ties.txt"))
 
 
 def test_again_is_the_same_to_the_bit(tmp_path):
