@@ -162,8 +162,7 @@ def test_each_tie_point_is_written_with_its_sigma(tmp_path):
     assert written.header.parse_crs().to_epsg() == int(UTM.split(":")[1])
     sigmas = np.column_stack([written[f"sigma_{axis}"] for axis in "enu"])
     assert np.all((sigmas[:, 2] > 0.1 * PIXEL) & (sigmas[:, 2] < 20 * PIXEL))
-    fewest, most = written.user_data.min(), written.user_data.max()
-    assert np.median(sigmas[written.user_data == fewest, 2]) > np.median(sigmas[written.user_data == most, 2])
+    assert np.all(sigmas[:, 2] > sigmas[:, :2].min(axis=1))  # heights of near-vertical rays are the weaker
     assert "Each tie point in the colour of its own predicted sigma" in scene.report()
     run(scene.request(method="similarity", tie_points=cloud))
     assert [d.name for d in laspy.read(cloud).point_format.extra_dimensions] == ["residual"]
