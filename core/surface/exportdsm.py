@@ -141,10 +141,10 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
             "fill": request.fill,
             "ortho_depth": int(request.ortho_depth),
         }
+        flown = min((p.time for p in survey.photographs if p.time), default=None)
         with stages.of("finishing"):
-            summary = finish(
-                plan, cut[-1], wanted, start.left_out, fingerprint, georeferencing, parameters, progress.part(0.93, 0.99)
-            )
+            part = progress.part(0.93, 0.99)
+            summary = finish(plan, cut[-1], wanted, start.left_out, fingerprint, georeferencing, parameters, part, flown=flown)
         result = Result(
             gsd=plan.gsd,
             coverage_percent=summary.coverage_percent,

@@ -78,10 +78,14 @@ def finish(
     georeferencing: dict[str, Any],
     parameters: dict[str, Any],
     progress: Progress,
+    *,
+    flown: str | None = None,
 ) -> Summary:
     """Write the rasters from the ``computed`` tiles and return the summary; the DSM takes its place last.
 
     ``left_out`` are the tie points (n, 3: easting, northing, height) to compare with.
+
+    ``flown`` (ISO 8601) is the time of the first photograph, by which steps on several dates tell them apart.
 
     Raises
     ------
@@ -95,6 +99,8 @@ def finish(
         "STRANDLINE_PARAMETERS": json.dumps(encode(parameters)),
         FINGERPRINT: fingerprint,
     }
+    if flown:
+        tags["STRANDLINE_DATE"] = flown
     located = {
         **tags,
         "VERTICAL_DATUM": vertical_datum(georeferencing["heights"], grid.crs),

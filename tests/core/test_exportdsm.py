@@ -136,7 +136,17 @@ def make_survey(folder, images, frame, block_views):
     listed = []
     for view in block_views:
         path = images / view.name
-        listed.append(Photograph(view.name, path.stat().st_size, file_digest(path), CAMERA.width, CAMERA.height, "camera"))
+        listed.append(
+            Photograph(
+                view.name,
+                path.stat().st_size,
+                file_digest(path),
+                CAMERA.width,
+                CAMERA.height,
+                "camera",
+                time=f"2020-06-06T09:3{len(listed)}:00",
+            )
+        )
     survey = Survey.create(folder, images, frame.crs, listed)
     pivot, covariance = (0.0, 0.0, 0.0), tuple(float(v) for v in np.diag([1e-4] * 3 + [1e-8] * 4).ravel())
     Georef(frame, "similarity", (1.0, *np.eye(3).ravel().tolist(), 0.0, 0.0, 0.0), pivot, covariance).write(survey)
@@ -316,6 +326,7 @@ def test_tags_carry_the_georeferencing(scene, surface):
     assert len(data["covariance"]) == 49
     assert data["frame"]["longitude"] == pytest.approx(scene.frame.longitude)
     assert json.loads(tags["STRANDLINE_PARAMETERS"])["regularity"] == 1.0
+    assert tags["STRANDLINE_DATE"] == "2020-06-06T09:30:00"  # the first photograph's
 
 
 def test_the_report_stands_and_is_self_contained(scene, surface):

@@ -416,11 +416,10 @@ def test_cancel_from_processing_stops_the_engine(fake_engine, qgis, survey):
 def test_several_rasters_bring_their_names_and_dates(sent, qgis, tmp_path):
     from qgis.core import QgsDateTimeRange, QgsProcessingException, QgsRasterLayer
     from qgis.PyQt.QtCore import QDate, QDateTime, QTime
-    from test_styles import make_raster
 
     for name in ("a", "b"):
-        make_raster(tmp_path / f"{name}.tif", [[1.0, 2.0], [3.0, 4.0]])
-    layers = [QgsRasterLayer(str(tmp_path / f"{name}.tif"), f"layer {name}") for name in ("a", "b")]
+        (tmp_path / f"{name}.asc").write_text("ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 1\n1.5 2.5\n")
+    layers = [QgsRasterLayer(str(tmp_path / f"{name}.asc"), f"layer {name}") for name in ("a", "b")]
     day = QDate(2018, 6, 6)
     layers[1].temporalProperties().setFixedTemporalRange(
         QgsDateTimeRange(QDateTime(day, QTime(0, 0)), QDateTime(day, QTime(23, 59)))
@@ -429,8 +428,8 @@ def test_several_rasters_bring_their_names_and_dates(sent, qgis, tmp_path):
     given = {"DSMS": layers, "OUTPUT": str(tmp_path / "out.gpkg"), "PRECISIONS": []}
     request = sent("timeseries", given)
     assert request["dsms"] == [
-        {"path": str(tmp_path / "a.tif"), "crs": None, "name": "layer a", "date": None},
-        {"path": str(tmp_path / "b.tif"), "crs": None, "name": "layer b", "date": "2018-06-06"},
+        {"path": str(tmp_path / "a.asc"), "crs": None, "name": "layer a", "date": None},
+        {"path": str(tmp_path / "b.asc"), "crs": None, "name": "layer b", "date": "2018-06-06"},
     ]
     assert request["precisions"] is None
     with pytest.raises(QgsProcessingException):
