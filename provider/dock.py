@@ -5,7 +5,7 @@ from typing import Any, Callable, Dict, List, Optional
 
 from qgis.gui import QgsCollapsibleGroupBox, QgsDockWidget
 from qgis.PyQt.QtCore import Qt
-from qgis.PyQt.QtWidgets import QLabel, QMenu, QProgressBar, QSplitter, QToolButton, QVBoxLayout, QWidget
+from qgis.PyQt.QtWidgets import QFrame, QLabel, QMenu, QProgressBar, QScrollArea, QSplitter, QToolButton, QVBoxLayout, QWidget
 
 from ..bridge.survey import SurveyError, SurveyView
 from ..i18n import tr
@@ -327,4 +327,8 @@ class MarkingDock(QgsDockWidget):
         column.addWidget(self.message)
         for widget in (self.bar, self.stop, self.verdict):
             widget.hide()
-        self.setWidget(whole)
+        scroll = QScrollArea()  # on small screens, or with large letters, QGIS's window need not grow for the dock
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setWidget(whole)
+        self.setWidget(scroll)
