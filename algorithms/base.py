@@ -128,10 +128,12 @@ class StepAlgorithm(QgsProcessingAlgorithm):
             python = find_python()
             request = {**build(self, parameters, context, folder, feedback), **self._rasters}
             if "scheduler" in request:
-                request["scheduler"] = request["scheduler"] or settings.read(settings.SCHEDULER) or None
+                request["scheduler"] = request["scheduler"] or settings.effective(settings.SCHEDULER) or None
+            if "workers" in request:
+                request["workers"] = request["workers"] or settings.workers()
             result = run_step(python, self.name(), request, feedback)
             return self._outputs(result, request, parameters, context, folder, feedback)
-        except (LayerError, EngineError, MissingEngine) as error:
+        except (LayerError, EngineError, MissingEngine, settings.BadSetting) as error:
             raise QgsProcessingException(str(error)) from error
         except Cancelled as error:
             raise QgsProcessingException(tr("Cancelled.")) from error

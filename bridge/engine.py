@@ -13,7 +13,7 @@ from qgis.core import QgsApplication
 from ..i18n import tr
 from . import settings
 from .environment import cleaned
-from .install import python_of, state
+from .install import forget, python_of, state
 
 ROOT = Path(__file__).resolve().parent.parent
 _PROBE = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))"
@@ -32,7 +32,7 @@ def find_python() -> str:
         When there is none, or it was made for another version of Strandline.
     """
     for origin, named in (
-        (tr("STRANDLINE_PYTHON"), os.environ.get("STRANDLINE_PYTHON", "").strip()),
+        ("STRANDLINE_PYTHON", settings.overridden(settings.PYTHON)),
         (tr("The option 'Python of the engine'"), settings.read(settings.PYTHON)),
     ):
         if named:
@@ -64,6 +64,20 @@ def profile_folder() -> Path:
 def install_folder() -> Path:
     """Return where an engine is to be installed: the clone's place if there is an engine already, else the profile's."""
     return clone_folder() if clone_folder().is_dir() else profile_folder()
+
+
+def remove() -> None:
+    """Remove the engine of the QGIS profile; that of a clone is the developer's.
+
+    Raises
+    ------
+    OSError
+        When files of it cannot be removed; what is left does not count as an engine.
+    """
+    folder = profile_folder()
+    forget(folder)
+    if folder.is_dir():
+        shutil.rmtree(folder)
 
 
 def base_python(named: Optional[str] = None) -> str:

@@ -40,6 +40,11 @@ def state(folder: Path) -> str:
     return "ready" if marker.read_text(encoding="utf-8").strip() == fingerprint() else "outdated"
 
 
+def forget(folder: Path) -> None:
+    """Have the venv ``folder`` count as missing from now on."""
+    (folder / _MARKER).unlink(missing_ok=True)
+
+
 def command(python: str, folder: Path, *, wheels: Optional[Path] = None, fresh: bool = False) -> List[str]:
     """Return the command with which the door makes the venv ``folder`` with ``python``."""
     options = [*(["--wheels", str(wheels)] if wheels else []), *(["--fresh"] if fresh else [])]
@@ -57,7 +62,7 @@ def make(folder: Path, *, more: Sequence[Path] = (), wheels: Optional[Path] = No
     subprocess.CalledProcessError
         When venv or pip fails; they have said why.
     """
-    (folder / _MARKER).unlink(missing_ok=True)
+    forget(folder)
     inner = str(python_of(folder))
     if fresh or not _works([inner, "-m", "pip", "--version"]):
         folder.parent.mkdir(parents=True, exist_ok=True)

@@ -1424,6 +1424,50 @@
    <translation>interpolée</translation>
   </message>
   <message>
+   <source>Survey layers</source>
+   <translation>Couches du levé</translation>
+  </message>
+  <message>
+   <source>Writes where the photographs of a survey were taken, what ground each shows, and its tie points as layers. A survey that is not georeferenced yet gives the GNSS positions alone.</source>
+   <translation>Écrit en couches d'où les photographies d'un levé ont été prises, quel terrain chacune montre, et ses points de liaison. Un levé qui n'est pas encore géoréférencé ne donne que les positions GNSS.</translation>
+  </message>
+  <message>
+   <source>Most tie points</source>
+   <translation>Nombre maximal de points de liaison</translation>
+  </message>
+  <message>
+   <source>So many tie points are written at most, evenly chosen among all; 0 writes all of them.</source>
+   <translation>On écrit au plus ce nombre de points de liaison, choisis régulièrement parmi tous ; 0 les écrit tous.</translation>
+  </message>
+  <message>
+   <source>Where each photograph was taken, with its file and a small picture of it.</source>
+   <translation>D'où chaque photographie a été prise, avec son fichier et une vignette.</translation>
+  </message>
+  <message>
+   <source>Footprints</source>
+   <translation>Emprises</translation>
+  </message>
+  <message>
+   <source>What each photograph shows of a level at the median height of its tie points.</source>
+   <translation>Ce que chaque photographie montre d'un plan horizontal à la hauteur médiane de ses points de liaison.</translation>
+  </message>
+  <message>
+   <source>Tie points</source>
+   <translation>Points de liaison</translation>
+  </message>
+  <message>
+   <source>Tie points with their height (m), the number of photographs that show each, and its residual (px).</source>
+   <translation>Les points de liaison avec leur hauteur (m), le nombre de photographies qui les montrent et leur résidu (px).</translation>
+  </message>
+  <message>
+   <source>Tie points written</source>
+   <translation>Points de liaison écrits</translation>
+  </message>
+  <message>
+   <source>Tie points of the survey</source>
+   <translation>Points de liaison du levé</translation>
+  </message>
+  <message>
    <source>Find tie points</source>
    <translation>Chercher les points de liaison</translation>
   </message>
@@ -1552,10 +1596,6 @@
    <translation>code de sortie {}</translation>
   </message>
   <message>
-   <source>STRANDLINE_PYTHON</source>
-   <translation>STRANDLINE_PYTHON</translation>
-  </message>
-  <message>
    <source>The option 'Python of the engine'</source>
    <translation>L'option « Python du moteur »</translation>
   </message>
@@ -1616,384 +1656,496 @@
    <translation>{} n'est pas un SCR que QGIS connaît : {}.</translation>
   </message>
   <message>
+   <source>The option 'Processes'</source>
+   <translation>L'option « Processus »</translation>
+  </message>
+  <message>
+   <source>{} is '{}': it must be a whole number, 0 for one process per processor.</source>
+   <translation>{} vaut « {} » : il faut un nombre entier, 0 pour un processus par processeur.</translation>
+  </message>
+  <message>
    <source>The survey {} cannot be read: {}.</source>
-   <translation type="unfinished" />
+   <translation>Le levé {} ne peut pas être lu : {}.</translation>
   </message>
   <message>
    <source>Something is still running: wait for it or cancel it.</source>
-   <translation type="unfinished" />
+   <translation>Une tâche est encore en cours : attendez-la ou annulez-la.</translation>
   </message>
   <message>
    <source>{} cannot be started.</source>
-   <translation type="unfinished" />
+   <translation>{} ne peut pas être lancé.</translation>
   </message>
   <message>
    <source>It failed without a word.</source>
-   <translation type="unfinished" />
+   <translation>Échec sans message.</translation>
   </message>
   <message>
    <source>A table with the fields gcp, image, x, y, in pixels from the top-left corner.</source>
-   <translation type="unfinished" />
+   <translation>Une table avec les champs gcp, image, x, y, en pixels depuis le coin supérieur gauche.</translation>
   </message>
   <message>
    <source>New...</source>
-   <translation type="unfinished" />
+   <translation>Nouvelle...</translation>
   </message>
   <message>
    <source>Make an empty table of marks, or open one that is there.</source>
-   <translation type="unfinished" />
+   <translation>Créer une table de pointés vide, ou en ouvrir une qui existe.</translation>
   </message>
   <message>
    <source>Without a field the height is the Z of the geometry.</source>
-   <translation type="unfinished" />
+   <translation>Sans champ, la hauteur est le Z de la géométrie.</translation>
   </message>
   <message>
    <source>Which points are control and which only check.</source>
-   <translation type="unfinished" />
+   <translation>Quels points servent d'appui et lesquels ne servent qu'au contrôle.</translation>
   </message>
   <message>
    <source>{} is not a table of marks: it needs the fields gcp, image, x and y.</source>
-   <translation type="unfinished" />
+   <translation>{} n'est pas une table de pointés : il lui faut les champs gcp, image, x et y.</translation>
   </message>
   <message>
    <source>GeoPackage (*.gpkg);;Comma-separated values (*.csv)</source>
-   <translation type="unfinished" />
+   <translation>GeoPackage (*.gpkg);;Valeurs séparées par des virgules (*.csv)</translation>
   </message>
   <message>
    <source>Table of marks</source>
-   <translation type="unfinished" />
+   <translation>Table de pointés</translation>
   </message>
   <message>
    <source>Survey</source>
-   <translation type="unfinished" />
+   <translation>Levé</translation>
   </message>
   <message>
    <source>Name, height</source>
-   <translation type="unfinished" />
+   <translation>Nom, hauteur</translation>
   </message>
   <message>
    <source>Role</source>
-   <translation type="unfinished" />
+   <translation>Rôle</translation>
   </message>
   <message>
    <source>Sigmas</source>
-   <translation type="unfinished" />
+   <translation>Écarts-types</translation>
   </message>
   <message>
    <source>Mark ground points</source>
-   <translation type="unfinished" />
+   <translation>Pointer les points au sol</translation>
+  </message>
+  <message>
+   <source>Add survey to map...</source>
+   <translation>Ajouter un levé à la carte...</translation>
+  </message>
+  <message>
+   <source>The survey is in the map.</source>
+   <translation>Le levé est dans la carte.</translation>
   </message>
   <message>
    <source>Predict</source>
-   <translation type="unfinished" />
+   <translation>Prédire</translation>
   </message>
   <message>
    <source>Compute where each point should be seen in which photograph</source>
-   <translation type="unfinished" />
+   <translation>Calculer où chaque point devrait se voir dans quelle photographie</translation>
   </message>
   <message>
    <source>Measure</source>
-   <translation type="unfinished" />
+   <translation>Mesurer</translation>
   </message>
   <message>
    <source>Look for painted targets where points are predicted, and measure them</source>
-   <translation type="unfinished" />
+   <translation>Chercher les cibles peintes là où les points sont prédits, et les mesurer</translation>
   </message>
   <message>
    <source>Adjust</source>
-   <translation type="unfinished" />
+   <translation>Compenser</translation>
   </message>
   <message>
    <source>Georeference the survey with these marks, then show the residuals</source>
-   <translation type="unfinished" />
+   <translation>Géoréférencer le levé avec ces pointés, puis montrer les résidus</translation>
+  </message>
+  <message>
+   <source>To map</source>
+   <translation>Vers la carte</translation>
+  </message>
+  <message>
+   <source>Add the survey's photographs, tie points, residuals and surface to the map</source>
+   <translation>Ajouter à la carte les photographies, les points de liaison, les résidus et la surface du levé</translation>
   </message>
   <message>
    <source>Undo (Ctrl+Z)</source>
-   <translation type="unfinished" />
+   <translation>Annuler la dernière action (Ctrl+Z)</translation>
   </message>
   <message>
    <source>Redo (Ctrl+Shift+Z)</source>
-   <translation type="unfinished" />
+   <translation>Rétablir (Ctrl+Maj+Z)</translation>
   </message>
   <message>
    <source>Cancel</source>
-   <translation type="unfinished" />
+   <translation>Annuler</translation>
   </message>
   <message>
    <source>Stop what is running</source>
-   <translation type="unfinished" />
+   <translation>Arrêter ce qui est en cours</translation>
   </message>
   <message>
    <source>Choose the layer of ground points, the field of their names, and the table of marks.</source>
-   <translation type="unfinished" />
+   <translation>Choisissez la couche des points au sol, le champ de leurs noms et la table de pointés.</translation>
   </message>
   <message>
    <source>Choose the survey folder to begin.</source>
-   <translation type="unfinished" />
+   <translation>Choisissez le dossier du levé pour commencer.</translation>
   </message>
   <message>
    <source>The survey is not oriented yet: run 'Orient' first. Until then all photographs are listed.</source>
-   <translation type="unfinished" />
+   <translation>Le levé n'est pas encore orienté : lancez d'abord « Orienter ». En attendant, toutes les photographies sont listées.</translation>
   </message>
   <message>
    <source>Nothing tells where the photographs were taken: mark three points in two photographs each, then adjust.</source>
-   <translation type="unfinished" />
+   <translation>Rien n'indique d'où les photographies ont été prises : pointez trois points dans deux photographies chacun, puis compensez.</translation>
   </message>
   <message>
    <source>Choose a point in the list first.</source>
-   <translation type="unfinished" />
+   <translation>Choisissez d'abord un point dans la liste.</translation>
   </message>
   <message>
    <source>There are no marks yet: mark points in the photographs first.</source>
-   <translation type="unfinished" />
+   <translation>Il n'y a pas encore de pointés : pointez d'abord des points dans les photographies.</translation>
   </message>
   <message>
    <source>The areas that the last georeferencing ignored are not: use 'Adjust with...' for that.</source>
-   <translation type="unfinished" />
+   <translation>Les zones que le dernier géoréférencement ignorait ne le sont pas : pour cela, utilisez « Compenser avec... ».</translation>
   </message>
   <message>
    <source>This is the first.</source>
-   <translation type="unfinished" />
+   <translation>C'est la première.</translation>
   </message>
   <message>
    <source>This is the last.</source>
-   <translation type="unfinished" />
+   <translation>C'est la dernière.</translation>
   </message>
   <message>
    <source>{} targets were measured, {} were not found.</source>
-   <translation type="unfinished" />
+   <translation>{} cibles ont été mesurées, {} n'ont pas été trouvées.</translation>
   </message>
   <message>
    <source>{} marks by eye lie more than 3 px from them and stay.</source>
-   <translation type="unfinished" />
+   <translation>{} pointés à l'œil en sont à plus de 3 px et restent.</translation>
+  </message>
+  <message>
+   <source>The residuals cannot be kept for the map: {}.</source>
+   <translation>Les résidus ne peuvent pas être gardés pour la carte : {}.</translation>
   </message>
   <message>
    <source>Control: {} in plan, {} in height. Check: {}, {}.</source>
-   <translation type="unfinished" />
+   <translation>Appui : {} en plan, {} en hauteur. Contrôle : {}, {}.</translation>
   </message>
   <message>
    <source>No point of the layer has a name: choose the field of the names.</source>
-   <translation type="unfinished" />
+   <translation>Aucun point de la couche n'a de nom : choisissez le champ des noms.</translation>
   </message>
   <message>
    <source>The georeferencing is older than the orientation: adjust again.</source>
-   <translation type="unfinished" />
+   <translation>Le géoréférencement est plus ancien que l'orientation : compensez de nouveau.</translation>
   </message>
   <message>
    <source>Nothing is georeferenced yet: all photographs are listed, the nearest first. 'Predict' does it by GNSS.</source>
-   <translation type="unfinished" />
+   <translation>Rien n'est encore géoréférencé : toutes les photographies sont listées, les plus proches d'abord. « Prédire » le fait par GNSS.</translation>
   </message>
   <message>
    <source>{} rows of the table name no point or photograph, are not complete, or stand twice: {}.</source>
-   <translation type="unfinished" />
+   <translation>{} lignes de la table ne nomment ni point ni photographie, sont incomplètes ou en double : {}.</translation>
   </message>
   <message>
    <source>Survey, points and marks</source>
-   <translation type="unfinished" />
+   <translation>Levé, points et pointés</translation>
   </message>
   <message>
    <source>Targets of this point</source>
-   <translation type="unfinished" />
+   <translation>Cibles de ce point</translation>
   </message>
   <message>
    <source>Targets of all points</source>
-   <translation type="unfinished" />
+   <translation>Cibles de tous les points</translation>
   </message>
   <message>
    <source>Adjust with...</source>
-   <translation type="unfinished" />
+   <translation>Compenser avec...</translation>
   </message>
   <message>
    <source>none</source>
-   <translation type="unfinished" />
+   <translation>aucun</translation>
+  </message>
+  <message>
+   <source>Ready: {}</source>
+   <translation>Prêt : {}</translation>
+  </message>
+  <message>
+   <source>The engine was removed from the profile.</source>
+   <translation>Le moteur a été supprimé du profil.</translation>
+  </message>
+  <message>
+   <source>The engine could not be removed whole: {}.</source>
+   <translation>Le moteur n'a pas pu être supprimé en entier : {}.</translation>
+  </message>
+  <message>
+   <source>The engine works.</source>
+   <translation>Le moteur fonctionne.</translation>
   </message>
   <message>
    <source>move the mark of {}</source>
-   <translation type="unfinished" />
+   <translation>déplacer le pointé de {}</translation>
   </message>
   <message>
    <source>mark {}</source>
-   <translation type="unfinished" />
+   <translation>pointer {}</translation>
   </message>
   <message>
    <source>remove the mark of {}</source>
-   <translation type="unfinished" />
+   <translation>supprimer le pointé de {}</translation>
   </message>
   <message>
    <source>measure {} targets</source>
-   <translation type="unfinished" />
+   <translation>mesurer {} cibles</translation>
   </message>
   <message>
    <source>{} is there already.</source>
-   <translation type="unfinished" />
+   <translation>{} existe déjà.</translation>
   </message>
   <message>
    <source>it cannot be created there</source>
-   <translation type="unfinished" />
+   <translation>elle ne peut pas être créée à cet endroit</translation>
   </message>
   <message>
    <source>The table of marks {} cannot be made: {}.</source>
-   <translation type="unfinished" />
+   <translation>La table de pointés {} ne peut pas être créée : {}.</translation>
   </message>
   <message>
    <source>The table {} has no field {}: marks need gcp, image, x and y.</source>
-   <translation type="unfinished" />
+   <translation>La table {} n'a pas de champ {} : les pointés ont besoin de gcp, image, x et y.</translation>
   </message>
   <message>
    <source>The table {} cannot be edited: save it as a GeoPackage first.</source>
-   <translation type="unfinished" />
+   <translation>La table {} ne peut pas être modifiée : enregistrez-la d'abord en GeoPackage.</translation>
   </message>
   <message>
    <source>The table {} cannot be written: {}</source>
-   <translation type="unfinished" />
+   <translation>La table {} ne peut pas être écrite : {}</translation>
   </message>
   <message>
-   <source>the one that 'Check engine' installs</source>
-   <translation>celui que « Vérifier le moteur » installe</translation>
+   <source>Check</source>
+   <translation>Vérifier</translation>
+  </message>
+  <message>
+   <source>Remove...</source>
+   <translation>Supprimer...</translation>
+  </message>
+  <message>
+   <source>the one that 'Install' makes</source>
+   <translation>celui que « Installer » crée</translation>
+  </message>
+  <message>
+   <source>none: packages come from the network</source>
+   <translation>aucun : les paquets viennent du réseau</translation>
+  </message>
+  <message>
+   <source>one per processor</source>
+   <translation>un par processeur</translation>
+  </message>
+  <message>
+   <source>Each process takes memory: use fewer if it runs short.</source>
+   <translation>Chaque processus prend de la mémoire : réduisez leur nombre si elle manque.</translation>
   </message>
   <message>
    <source>none: this computer</source>
    <translation>aucun : cet ordinateur</translation>
   </message>
   <message>
-   <source>Strandline computes in a Python of its own. Run 'Check engine' from the toolbox to install or test it.</source>
-   <translation>Strandline calcule dans un Python à part. Lancez « Vérifier le moteur » depuis la boîte à outils pour l'installer ou le tester.</translation>
+   <source>Update</source>
+   <translation>Mettre à jour</translation>
+  </message>
+  <message>
+   <source>Remove the engine in {}? It can be installed again.</source>
+   <translation>Supprimer le moteur dans {} ? On peut le réinstaller.</translation>
+  </message>
+  <message>
+   <source>Engine</source>
+   <translation>Moteur</translation>
+  </message>
+  <message>
+   <source>Strandline computes in a Python of its own, outside QGIS.</source>
+   <translation>Strandline calcule dans un Python à lui, hors de QGIS.</translation>
+  </message>
+  <message>
+   <source>State</source>
+   <translation>État</translation>
   </message>
   <message>
    <source>Python of the engine</source>
    <translation>Python du moteur</translation>
   </message>
   <message>
+   <source>Work</source>
+   <translation>Travail</translation>
+  </message>
+  <message>
+   <source>Environment variables ({}) come before these options, an algorithm's parameters before both.</source>
+   <translation>Les variables d'environnement ({}) passent avant ces options, les paramètres d'un algorithme avant les deux.</translation>
+  </message>
+  <message>
+   <source>{} ({} says {})</source>
+   <translation>{} ({} vaut {})</translation>
+  </message>
+  <message>
    <source>Previous photograph (P)</source>
-   <translation type="unfinished" />
+   <translation>Photographie précédente (P)</translation>
   </message>
   <message>
    <source>Next photograph (N)</source>
-   <translation type="unfinished" />
+   <translation>Photographie suivante (N)</translation>
   </message>
   <message>
    <source>Skip</source>
-   <translation type="unfinished" />
+   <translation>Passer</translation>
   </message>
   <message>
    <source>The point cannot be seen here: go on to the next that is not marked (S)</source>
-   <translation type="unfinished" />
+   <translation>Le point ne se voit pas ici : aller au prochain qui n'est pas pointé (S)</translation>
   </message>
   <message>
    <source>Delete</source>
-   <translation type="unfinished" />
+   <translation>Supprimer</translation>
   </message>
   <message>
    <source>Delete the mark (Del)</source>
-   <translation type="unfinished" />
+   <translation>Supprimer le pointé (Suppr)</translation>
   </message>
   <message>
    <source>All</source>
-   <translation type="unfinished" />
+   <translation>Tout</translation>
   </message>
   <message>
    <source>Show all of the photograph (F)</source>
-   <translation type="unfinished" />
+   <translation>Montrer toute la photographie (F)</translation>
   </message>
   <message>
    <source>Enhanced</source>
-   <translation type="unfinished" />
+   <translation>Rehaussée</translation>
   </message>
   <message>
    <source>Show the enhanced image in place of the photograph (E)</source>
-   <translation type="unfinished" />
+   <translation>Montrer l'image rehaussée à la place de la photographie (E)</translation>
   </message>
   <message>
    <source>Choose a photograph of a point in the list.</source>
-   <translation type="unfinished" />
+   <translation>Choisissez une photographie d'un point dans la liste.</translation>
   </message>
   <message>
    <source>There is no enhanced image of {}: run 'Enhance'.</source>
-   <translation type="unfinished" />
+   <translation>Il n'y a pas d'image rehaussée de {} : lancez « Rehausser ».</translation>
   </message>
   <message>
    <source>Reading {}...</source>
-   <translation type="unfinished" />
+   <translation>Lecture de {}...</translation>
   </message>
   <message>
    <source>{} The enhanced image is shown.</source>
-   <translation type="unfinished" />
+   <translation>{} L'image rehaussée est montrée.</translation>
   </message>
   <message>
    <source>predicted to {:.1f} px</source>
-   <translation type="unfinished" />
+   <translation>prédit à {:.1f} px près</translation>
   </message>
   <message>
    <source>mark {:.1f} px off</source>
-   <translation type="unfinished" />
+   <translation>pointé à {:.1f} px</translation>
   </message>
   <message>
    <source>{} cannot be shown: {}.</source>
-   <translation type="unfinished" />
+   <translation>{} ne peut pas être montré : {}.</translation>
   </message>
   <message>
    <source>not found</source>
-   <translation type="unfinished" />
+   <translation>introuvable</translation>
   </message>
   <message>
    <source>{} cannot be shown: it holds {} x {} pixels, the survey says {} x {}.</source>
-   <translation type="unfinished" />
+   <translation>{} ne peut pas être montré : il contient {} x {} pixels, le levé indique {} x {}.</translation>
   </message>
   <message>
    <source>damaged</source>
-   <translation type="unfinished" />
+   <translation>endommagé</translation>
   </message>
   <message>
    <source>it is all one value</source>
-   <translation type="unfinished" />
+   <translation>tout y a la même valeur</translation>
   </message>
   <message>
    <source>Point, photograph</source>
-   <translation type="unfinished" />
+   <translation>Point, photographie</translation>
   </message>
   <message>
    <source>Off</source>
-   <translation type="unfinished" />
+   <translation>Écart</translation>
   </message>
   <message>
    <source>Of a point: in how many photographs it is marked. Of a photograph: how it was marked.</source>
-   <translation type="unfinished" />
+   <translation>D'un point : dans combien de photographies il est pointé. D'une photographie : comment elle a été pointée.</translation>
   </message>
   <message>
    <source>Of a point: its residual in plan and height. Of a mark: from where it should be.</source>
-   <translation type="unfinished" />
+   <translation>D'un point : son résidu en plan et en hauteur. D'un pointé : son écart à la prédiction.</translation>
   </message>
   <message>
    <source>by eye</source>
-   <translation type="unfinished" />
+   <translation>à l'œil</translation>
   </message>
   <message>
    <source>score {:.2f}</source>
-   <translation type="unfinished" />
+   <translation>score {:.2f}</translation>
   </message>
   <message>
    <source>skipped</source>
-   <translation type="unfinished" />
+   <translation>passée</translation>
   </message>
   <message>
    <source>It took no part in the adjustment: two marks are needed.</source>
-   <translation type="unfinished" />
+   <translation>Il n'a pas participé à la compensation : il faut deux pointés.</translation>
   </message>
   <message>
    <source>{}: {:+.3f} m east, {:+.3f} m north, {:+.3f} m up</source>
-   <translation type="unfinished" />
+   <translation>{} : {:+.3f} m est, {:+.3f} m nord, {:+.3f} m haut</translation>
   </message>
   <message>
    <source>as was to be expected</source>
-   <translation type="unfinished" />
+   <translation>comme il fallait s'y attendre</translation>
   </message>
   <message>
    <source>larger than expected</source>
-   <translation type="unfinished" />
+   <translation>plus grand qu'attendu</translation>
   </message>
   <message>
    <source>much too large</source>
-   <translation type="unfinished" />
+   <translation>beaucoup trop grand</translation>
+  </message>
+  <message>
+   <source>The layers cannot be written to {}: {}.</source>
+   <translation>Les couches ne peuvent pas être écrites dans {} : {}.</translation>
+  </message>
+  <message>
+   <source>Survey {}</source>
+   <translation>Levé {}</translation>
+  </message>
+  <message>
+   <source>Residuals, {} times enlarged</source>
+   <translation>Résidus, agrandis {} fois</translation>
+  </message>
+  <message>
+   <source>Surface</source>
+   <translation>Surface</translation>
+  </message>
+  <message>
+   <source>Hillshade</source>
+   <translation>Ombrage</translation>
   </message>
  </context>
 </TS>

@@ -1,12 +1,11 @@
 """The dock in which ground points are marked in the photographs."""
 
-from pathlib import Path
+from importlib import import_module
 from typing import Any, Callable, Dict, List, Optional
 
-from qgis.core import QgsProject, QgsVectorLayer
 from qgis.gui import QgsCollapsibleGroupBox, QgsDockWidget
 from qgis.PyQt.QtCore import Qt
-from qgis.PyQt.QtWidgets import QHBoxLayout, QLabel, QMenu, QProgressBar, QSplitter, QToolButton, QVBoxLayout, QWidget
+from qgis.PyQt.QtWidgets import QFrame, QLabel, QMenu, QProgressBar, QScrollArea, QSplitter, QToolButton, QVBoxLayout, QWidget
 
 from ..bridge.survey import SurveyError, SurveyView
 from ..i18n import tr
@@ -21,6 +20,7 @@ from .marks import MarksError, MarksTable
 from .pane import Pane
 from .pointlist import PointList
 from .surveymap import add_survey, keep_residuals
+from .widgets import button, row
 
 
 class MarkingDock(QgsDockWidget):
@@ -32,17 +32,17 @@ class MarkingDock(QgsDockWidget):
         self.marking: Optional[Marking] = None
         self.chooser, self.list, self.pane = Chooser(), PointList(), Pane()
         self.background, self.selection = Background(self), MapSelection(self)
-        self.predict = _button(tr("Predict"), tr("Compute where each point should be seen in which photograph"))
-        self.measure = _button(tr("Measure"), tr("Look for painted targets where points are predicted, and measure them"))
-        self.adjust = _button(tr("Adjust"), tr("Georeference the survey with these marks, then show the residuals"))
-        self.show_map = _button(tr("To map"), tr("Add the survey's photographs, tie points, residuals and surface to the map"))
-        self.undo = _button("↶", tr("Undo (Ctrl+Z)"))
-        self.redo = _button("↷", tr("Redo (Ctrl+Shift+Z)"))
+        self.predict = button(tr("Predict"), tr("Compute where each point should be seen in which photograph"))
+        self.measure = button(tr("Measure"), tr("Look for painted targets where points are predicted, and measure them"))
+        self.adjust = button(tr("Adjust"), tr("Georeference the survey with these marks, then show the residuals"))
+        self.show_map = button(tr("To map"), tr("Add the survey's photographs, tie points, residuals and surface to the map"))
+        self.undo = button("↶", tr("Undo (Ctrl+Z)"))
+        self.redo = button("↷", tr("Redo (Ctrl+Shift+Z)"))
         self.verdict, self.message, self.bar, self.stop = (
             QLabel(),
             QLabel(),
             QProgressBar(),
-            _button(tr("Cancel"), tr("Stop what is running")),
+            button(tr("Cancel"), tr("Stop what is running")),
         )
         self._lay_out()
         self._connect()
@@ -132,7 +132,7 @@ class MarkingDock(QgsDockWidget):
 
     def open_dialog(self) -> None:
         """Open 'Georeference' itself, filled in, for all that the button does not ask."""
-        from qgis import processing
+        processing = import_module("processing")  # QGIS's own plugin, there in the desktop alone
 
         if self.marking is not None:
             marking = self.marking
@@ -176,12 +176,12 @@ class MarkingDock(QgsDockWidget):
         self.background.run(name, parameters, arrived, self.say, keep)
 
     def _predicted(self, marking: Marking, results: Dict[str, Any]) -> None:
-        marking.take_predictions(engine_runs.read_predictions(_opened(results["OUTPUT"])))
+        marking.take_predictions(engine_runs.read_predictions(engine_runs.opened(results["OUTPUT"])))
         self.list.show_marking(marking)
         self._again()
 
     def _measured(self, marking: Marking, results: Dict[str, Any]) -> None:
-        taken, left = marking.take_measured(engine_runs.read_measured(_opened(results["OUTPUT"])))
+        taken, left = marking.take_measured(engine_runs.read_measured(engine_runs.opened(results["OUTPUT"])))
         told = tr("{} targets were measured, {} were not found.").format(taken + left, results["MISSED_COUNT"])
         if left:
             told += " " + tr("{} marks by eye lie more than 3 px from them and stay.").format(left)
@@ -189,13 +189,13 @@ class MarkingDock(QgsDockWidget):
 
     def _adjusted(self, marking: Marking, results: Dict[str, Any], note: str) -> None:
         if results.get("RESIDUALS"):
-            marking.take_residuals(read_residuals(_opened(results["RESIDUALS"])))
+            marking.take_residuals(read_residuals(engine_runs.opened(results["RESIDUALS"])))
             try:
                 keep_residuals(marking.survey, str(results["RESIDUALS"]))
             except OSError as error:
                 note += " " + tr("The residuals cannot be kept for the map: {}.").format(error)
         told = tr("Control: {} in plan, {} in height. Check: {}, {}.").format(
-            *(_cm(results.get(k)) for k in ("PLANI_CONTROL", "ALTI_CONTROL", "PLANI_CHECK", "ALTI_CHECK"))
+            *(engine_runs.centimetres(results.get(k)) for k in ("PLANI_CONTROL", "ALTI_CONTROL", "PLANI_CHECK", "ALTI_CHECK"))
         )
         self.verdict.setText(" ".join(filter(None, (told, note, self.message.text()))))
         self.verdict.show()
@@ -222,10 +222,10 @@ class MarkingDock(QgsDockWidget):
         marking = self.marking
         self.list.refresh()
         self.pane.refresh()
-        for button, able in ((self.undo, "canUndo"), (self.redo, "canRedo")):
-            button.setEnabled(marking is not None and bool(getattr(marking.undo, able)()))
-        for button in (self.predict, self.measure, self.adjust, self.show_map):
-            button.setEnabled(marking is not None and not self.background.busy)
+        for tool, able in ((self.undo, "canUndo"), (self.redo, "canRedo")):
+            tool.setEnabled(marking is not None and bool(getattr(marking.undo, able)()))
+        for tool in (self.predict, self.measure, self.adjust, self.show_map):
+            tool.setEnabled(marking is not None and not self.background.busy)
 
     def _state(self) -> str:
         """Return what is to be known of survey and table, in a sentence or two."""
@@ -305,7 +305,7 @@ class MarkingDock(QgsDockWidget):
         more.addAction(tr("Adjust with..."), self.open_dialog)
         self.adjust.setMenu(more)
         self.adjust.setPopupMode(QToolButton.ToolButtonPopupMode.MenuButtonPopup)
-        tools = _row(self.predict, self.measure, self.adjust, self.show_map, None, self.undo, self.redo)
+        tools = row(self.predict, self.measure, self.adjust, self.show_map, None, self.undo, self.redo)
         for label in (self.verdict, self.message):
             label.setWordWrap(True)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -322,37 +322,13 @@ class MarkingDock(QgsDockWidget):
         column.addWidget(self.head)
         column.addLayout(tools)
         column.addWidget(split, 1)
-        column.addLayout(_row(self.bar, self.stop))
+        column.addLayout(row(self.bar, self.stop))
         column.addWidget(self.verdict)
         column.addWidget(self.message)
         for widget in (self.bar, self.stop, self.verdict):
             widget.hide()
-        self.setWidget(whole)
-
-
-def _opened(place: Any) -> QgsVectorLayer:
-    """Return a layer that an algorithm wrote: named by its file, or by its id when it was opened from the dialog."""
-    layer = QgsProject.instance().mapLayer(str(place))
-    return layer if layer is not None else QgsVectorLayer(str(place), Path(str(place)).stem, "ogr")
-
-
-def _cm(value: Any) -> str:
-    return tr("none") if value is None else f"{100.0 * value:.1f} cm"
-
-
-def _row(*widgets: Any) -> QHBoxLayout:
-    row = QHBoxLayout()
-    row.setContentsMargins(0, 0, 0, 0)
-    for widget in widgets:
-        if widget is None:
-            row.addStretch(1)
-        else:
-            row.addWidget(widget)
-    return row
-
-
-def _button(text: str, tip: str) -> QToolButton:
-    button = QToolButton()
-    button.setText(text)
-    button.setToolTip(tip)
-    return button
+        scroll = QScrollArea()  # on small screens, or with large letters, QGIS's window need not grow for the dock
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setWidget(whole)
+        self.setWidget(scroll)

@@ -4,9 +4,10 @@ import tempfile
 from pathlib import Path
 from typing import Any, Dict, Tuple
 
-from qgis.core import QgsCoordinateReferenceSystem, QgsVectorLayer
+from qgis.core import QgsCoordinateReferenceSystem, QgsProject, QgsVectorLayer
 
 from ..bridge.survey import SurveyView
+from ..i18n import tr
 from .groundpoints import Fields
 from .judgement import Prediction
 from .marks import Key, Mark, Marks, number
@@ -63,6 +64,17 @@ def read_predictions(layer: QgsVectorLayer) -> Dict[Key, Prediction]:
 def read_measured(layer: QgsVectorLayer) -> Marks:
     """Return the targets that were measured."""
     return {(str(f["gcp"]), str(f["image"])): Mark(f["x"], f["y"], number(f["score"])) for f in layer.getFeatures()}
+
+
+def opened(place: Any) -> QgsVectorLayer:
+    """Return a layer that an algorithm wrote: named by its file, or by its id when its dialog loaded it."""
+    layer = QgsProject.instance().mapLayer(str(place))
+    return layer if layer is not None else QgsVectorLayer(str(place), Path(str(place)).stem, "ogr")
+
+
+def centimetres(value: Any) -> str:
+    """Return metres in words."""
+    return tr("none") if value is None else f"{100.0 * value:.1f} cm"
 
 
 def _fields(fields: Fields, *, roles: bool) -> Dict[str, Any]:

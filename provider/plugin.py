@@ -45,6 +45,7 @@ class StrandlinePlugin:
             self._desktop = None
         if self._options is not None:
             self._iface.unregisterOptionsWidgetFactory(self._options)
+            self._options.close()
             self._options = None
         if self._provider is not None:
             QgsApplication.processingRegistry().removeProvider(self._provider)

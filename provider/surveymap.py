@@ -1,4 +1,4 @@
-"""A survey in the map: a group with photographs, footprints, tie points, residuals, surface and orthophoto, drawn as one would."""
+"""A survey in the map: a group with photographs, footprints, tie points, residuals, surface and orthophoto, styled."""
 
 import datetime
 import shutil

@@ -43,10 +43,12 @@ def state():
         "key": dock.pane.key,
         "levels": [level.factor for level in viewer._levels],
         "viewer": {"rect": rect(viewer), "corner": [origin.x() + corner.x(), origin.y() + corner.y()], "scale": viewer.scale},
-        "buttons": {name: rect(getattr(dock, name)) for name in ("predict", "measure", "adjust", "undo", "redo")},
+        "buttons": {name: rect(getattr(dock, name)) for name in ("predict", "measure", "adjust", "show_map", "undo", "redo")},
         "predictions": len(marking.predictions) if marking else 0,
         "residuals": {k: [v.plan, v.up, v.judgement] for k, v in marking.residuals.items()} if marking else {},
         "marks": [[*k, m.x, m.y] for k, m in marking.table.marks().items()] if marking else [],
+        "offsets": [o for o in (marking.sight(k).offset for k in marking.table.marks()) if o is not None] if marking else [],
+        "layers": [layer.name() for layer in QgsProject.instance().mapLayers().values()],
         "window": rect(iface.mainWindow()),
         "dock": rect(dock),
     }

@@ -2,8 +2,9 @@
 
 python3 tests/gui/session.py SIMULATION SURVEY FOLDER [--font 2]
 
-SIMULATION is a folder of 'Simulate survey', SURVEY a survey made of its JPG, georeferenced by GNSS; both are copied to FOLDER, where the
-pictures go, too. Points are marked where the simulation says they are; after the adjustment the residuals must be small.
+SIMULATION is a folder of 'Simulate survey', SURVEY a survey made of its JPG in that folder, georeferenced by GNSS. Both go to
+FOLDER, and the pictures, too. Points are marked where the simulation says they are; after the adjustment the residuals must be
+as expected, and the marks nearer to where the points should be seen.
 """
 
 import argparse
@@ -76,7 +77,7 @@ class Session:
             "STRANDLINE_GUI_MARKS": str(folder / "marks.gpkg"),
         }
         if font != 1:
-            environment["QT_FONT_DPI"] = str(96 * font)
+            environment["QT_FONT_DPI"] = str(round(96 * font))
             environment["STRANDLINE_GUI_WIDTH"] = "760"
         program = "qgis_process.bin" if shutil.which("qgis_process.bin") else "qgis_process"
         enable = {**screen.environment, **environment, "QT_QPA_PLATFORM": "offscreen"}
@@ -112,8 +113,12 @@ class Session:
 
     def mark(self, truth):
         """Click where the point of the photograph that is shown truly is; return how far off the mark is."""
-        time.sleep(0.3)
         state = self.wait(lambda s: 1 in s["levels"], "the photograph in full")
+        while True:  # the room the photograph has may still be changing
+            time.sleep(0.6)
+            before, state = state, self.state
+            if state["viewer"] == before["viewer"]:
+                break
         key = tuple(state["key"])
         x, y = truth[key]
         (left, top), scale = state["viewer"]["corner"], state["viewer"]["scale"]
@@ -126,6 +131,10 @@ class Session:
         if off > limit:
             raise SystemExit(f"The mark of {key} lies {off:.2f} px off, {limit:.2f} is what a pixel of the screen allows.")
         return off
+
+
+def mean(values):
+    return sum(values) / len(values)
 
 
 def main():
@@ -163,6 +172,7 @@ def main():
                 session.wait(lambda s, before=before: s["key"] != before, "the next photograph")
         print(f"{len(offs)} marks by mouse, at most {max(offs):.2f} px off", flush=True)
         session.pick("G1")
+        before_adjusting = mean(session.state["offsets"])
         x, y, w, h = session.state["buttons"]["adjust"]
         screen.click(x + 20, y + h / 2)
         session.wait(lambda s: s["busy"], "the adjustment begun", 20)
@@ -173,10 +183,17 @@ def main():
         screen.shot("adjusted")
         print(state["verdict"])
         used = {k: v for k, v in state["residuals"].items() if v[0] is not None}
-        worst = max(max(v[0], abs(v[1])) for v in used.values())
-        print(f"{len(used)} points, the largest residual is {100 * worst:.1f} cm")
-        if len(used) != 5 or worst > 0.05:
+        if len(used) != 5 or any(v[2] != "good" for v in used.values()):
             raise SystemExit(f"The residuals are not what they should be: {used}")
+        after = mean(state["offsets"])
+        print(f"marks lay {before_adjusting:.2f} px from where they should on average, {after:.2f} px after the adjustment")
+        if not after < before_adjusting:
+            raise SystemExit("The adjustment did not bring marks and points together.")
+        x, y, w, h = state["buttons"]["show_map"]
+        screen.click(x + w / 2, y + h / 2)
+        session.wait(lambda s: len(s["layers"]) >= 6 and not s["busy"], "the survey in the map", 120)
+        time.sleep(3)
+        screen.shot("map")
     finally:
         screen.close()
     return 0
