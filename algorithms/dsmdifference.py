@@ -58,8 +58,9 @@ class DsmDifference(StepAlgorithm):
             tr("Co-registration"),
             tr(
                 "What is taken off the difference: nothing (none), the median of stable ground (vertical), its tilted plane "
-                "(plane), or what stable ground and the georeferencing of both surfaces tell together (auto). What is left in is "
-                "counted in the deviations. A shift in plan (horizontal) is not yet available and is refused."
+                "(plane), or what stable ground and the georeferencing of both surfaces tell together (auto), with a shift in "
+                "plan where the relief of stable ground shows one for sure (auto) or in any case (horizontal). What is left in "
+                "is counted in the deviations."
             ),
             ("auto", "none", "vertical", "plane", "horizontal"),
             default="auto",
@@ -97,6 +98,11 @@ class DsmDifference(StepAlgorithm):
             "REGISTRATION_SIGMA",
             tr("Deviation of the registration (m)"),
             tr("Of one surface against the other as a whole; used where the stable ground cannot tell."),
+        )
+        yield ask.number(
+            "HORIZONTAL_SIGMA",
+            tr("Deviation of the registration in plan (m)"),
+            tr("Of one surface against the other, east and north; used where the relief of stable ground cannot tell."),
         )
         yield ask.number(
             "CORRELATION_RANGE",

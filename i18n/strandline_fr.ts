@@ -336,8 +336,8 @@
    <translation>Recalage</translation>
   </message>
   <message>
-   <source>What is taken off the difference: nothing (none), the median of stable ground (vertical), its tilted plane (plane), or what stable ground and the georeferencing of both surfaces tell together (auto). What is left in is counted in the deviations. A shift in plan (horizontal) is not yet available and is refused.</source>
-   <translation>Ce qui est retiré de la différence : rien (none), la médiane du terrain stable (vertical), son plan incliné (plane), ou ce que le terrain stable et le géoréférencement des deux surfaces indiquent ensemble (auto). Ce qui reste est compté dans les écarts-types. Un décalage en planimétrie (horizontal) n'est pas encore disponible et est refusé.</translation>
+   <source>What is taken off the difference: nothing (none), the median of stable ground (vertical), its tilted plane (plane), or what stable ground and the georeferencing of both surfaces tell together (auto), with a shift in plan where the relief of stable ground shows one for sure (auto) or in any case (horizontal). What is left in is counted in the deviations.</source>
+   <translation>Ce qui est retranché de la différence : rien (none), la médiane du terrain stable (vertical), son plan incliné (plane), ou ce que disent ensemble le terrain stable et le géoréférencement des deux surfaces (auto), avec un décalage en plan là où le relief du terrain stable le montre sûrement (auto) ou dans tous les cas (horizontal). Ce qui reste est compté dans les écarts-types.</translation>
   </message>
   <message>
    <source>Level of detection</source>
@@ -410,6 +410,14 @@
   <message>
    <source>Of one surface against the other as a whole; used where the stable ground cannot tell.</source>
    <translation>D'une surface entière par rapport à l'autre ; utilisé quand le terrain stable ne peut le dire.</translation>
+  </message>
+  <message>
+   <source>Deviation of the registration in plan (m)</source>
+   <translation>Écart-type du recalage en plan (m)</translation>
+  </message>
+  <message>
+   <source>Of one surface against the other, east and north; used where the relief of stable ground cannot tell.</source>
+   <translation>D'une surface par rapport à l'autre, vers l'est et le nord ; utilisé quand le relief du terrain stable ne peut le dire.</translation>
   </message>
   <message>
    <source>Range of shared errors (m)</source>

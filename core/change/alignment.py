@@ -32,7 +32,7 @@ _AXIS = 1e-9  # rotation (per cell) below which a raster counts as north-up
 
 @dataclass(frozen=True)
 class Aligned:
-    """A model seen through the common grid; ``offset`` (m to the east and north in the grid's CRS) is where it is read beside it."""
+    """A model seen through the common grid, and read ``offset`` (m to the east and north in the grid's CRS) beside it."""
 
     heights: Heights
     grid: Grid

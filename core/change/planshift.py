@@ -1,8 +1,8 @@
 """A shift in plan of one model against the other, from the relief of stable ground (Nuth & Kaab 2011).
 
 Where AFTER lies (dx, dy) beside BEFORE, the difference is -zx dx - zy dy beside level and tilts (Rosenholm & Torlegard 1988). The
-slopes are those of both models' mean at the scale of a metre: noise of a cell's own slope hides the relief, and noise of one model
-alone is in the difference, too. What both models' slopes share is relief, what they do not is noise, so that noise is no
+slopes are those of both models' mean at the scale of a metre: noise of a cell's own slope hides the relief, and noise of one
+model alone is in the difference, too. What both models' slopes share is relief, what they do not is noise, so that noise is no
 information; along axes where it is as large as the relief the shift is not determined. Each round reads AFTER where the shift
 found so far puts it.
 """
@@ -43,9 +43,9 @@ _EXACT = 1e-12  # m2
 class PlanShift:
     """A shift (2,) of AFTER to the east and north (m): what is ``applied``, what was ``found`` and its ``covariance`` (2, 2).
 
-    ``covariance`` holds what was known before, where stable ground does not tell. ``axes`` (2, k) are the directions that it tells.
-    ``alias`` (3, 2) are level and tilts about ``centre`` that fit the slopes of stable ground to the east and north, ``level`` (2,)
-    their means: what a shift makes of stable ground goes with the level and tilts that are taken off there, so that a zone
+    ``covariance`` holds what was known before, where stable ground does not tell. ``axes`` (2, k) are the directions it tells.
+    ``alias`` (3, 2) are level and tilts about ``centre`` that fit the slopes of stable ground to the east and north, ``level``
+    (2,) their means: what a shift makes of stable ground goes with the level and tilts that are taken off there, so that a zone
     suffers only by what its own slopes differ.
     """
 
@@ -130,7 +130,7 @@ def plan_shift(method: str, pair: Pair, stable: list[Any], given: float | None, 
             axis = found.axes[::-1, 0] * (-1, 1) if found.axes.shape[1] else None
             where = "" if axis is None else f" {direction(axis)}"
             raise NotEnoughData(
-                f"STABLE has too little relief to tell a shift in plan{where}: add stable ground with slopes (dunes, rocks, banks), "
+                f"STABLE has too little relief to tell a shift in plan{where}: add stable ground with slopes (dunes, rocks), "
                 "or set COREGISTER to auto."
             )
         return replace(found, applied=found.found)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
-_PAIRS, _FAR_PAIRS, _LAGS, _LEAST_PAIRS = 20_000, 200_000, 24, 200
+_PAIRS, _FAR_PAIRS, _LAGS, _LEAST_PAIRS = 8_000, 80_000, 24, 200
 _RANGES = 28  # candidates
 _BAND = 0.08  # of a lag, either way
 _SEED = 20150
@@ -76,17 +76,19 @@ def fit_variogram(
         return None
     reaches = np.geomspace(1.5 * shortest, lags[-1], _RANGES)
     weight = np.sqrt(pairs)
-    nugget, structures = _nested(lags, gamma, weight, reaches)
-    for _ in range(3):
+    nugget, structures = _nested(lags, gamma, weight, reaches, pairs=False)
+    for last in (False, False, True):
         # The scatter of an empirical value goes with the true one, which is the model's, not its own.
         expected = np.maximum(Variogram(nugget, structures).at(lags), 1e-9 * max(float(gamma.max()), 1e-30))
-        nugget, structures = _nested(lags, gamma, weight / expected, reaches)
+        nugget, structures = _nested(lags, gamma, weight / expected, reaches, pairs=last)
     told = tuple((sill, np.inf if reach >= reaches[-2] else reach) for sill, reach in structures)
     return Variogram(nugget, told, tuple(lags.tolist()), tuple(gamma.tolist()))
 
 
-def _nested(lags: Array, gamma: Array, weight: Array, reaches: Array) -> tuple[float, tuple[tuple[float, float], ...]]:
-    """Return the nugget and one or two structures of the weighted least squares; two only where they halve the squared misfit."""
+def _nested(
+    lags: Array, gamma: Array, weight: Array, reaches: Array, *, pairs: bool
+) -> tuple[float, tuple[tuple[float, float], ...]]:
+    """Return the nugget and one structure of the weighted least squares, or two where ``pairs`` halve the squared misfit."""
     parts = np.column_stack([np.ones(len(lags)), *(1.0 - correlation(lags, float(r)) for r in reaches)]) * weight[:, None]
     wanted = gamma * weight
 
@@ -98,8 +100,10 @@ def _nested(lags: Array, gamma: Array, weight: Array, reaches: Array) -> tuple[f
         return min(fits)
 
     count = range(len(reaches))
-    one, two = best((i,) for i in count), best((i, k) for i in count for k in count if k > i + 2)
-    _, (nugget, *sills), choice = two if two[0] < 0.5 * one[0] else one
+    fit = best((i,) for i in count)
+    if pairs and (two := best((i, k) for i in count for k in count if k > i + 2))[0] < 0.5 * fit[0]:
+        fit = two
+    _, (nugget, *sills), choice = fit
     return nugget, tuple((sill, float(reaches[i])) for sill, i in zip(sills, choice, strict=True) if sill > 0)
 
 

@@ -2,11 +2,11 @@
 
     python tests/benchmarks/bench_coverage.py [pairs [seed]]
 
-Each pair is a beach of 120 x 160 m on cells of 1 m, the later model on a grid of its own a fraction of a cell beside the first. Drawn
-anew for each: white noise and noise that is alike over 2 to 40 m (one range or two), a bias, a tilt, a shift in plan of 1 m in any
-direction, the place, size and relief of stable ground, sigmas given as rasters (different from place to place) or not at all, and
-what the sea took and left. Zones are a disk, a long strip, an L and two boxes that touch; their total is a fifth. The naive interval
-takes the cells as independent, with their true sigma.
+Each pair is a beach of 120 x 160 m on cells of 1 m, the later model on a grid of its own a fraction of a cell beside the first.
+Drawn anew for each: white noise and noise that is alike over 2 to 40 m (one range or two), a bias, a tilt, a shift in plan of 1 m
+in any direction, the place, size and relief of stable ground, sigmas given as rasters (different from place to place) or not at
+all, and what the sea took and left. Zones are a disk, a long strip, an L and two boxes that touch; all of them are a sixth. The
+naive interval takes the cells as independent, with their true sigma.
 """
 
 from __future__ import annotations

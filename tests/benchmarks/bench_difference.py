@@ -4,8 +4,8 @@
 
 Both get the same pair: ``side`` x ``side`` cells of noise on two grids half a cell apart, and disks (four by default). The plain
 peer reads both rasters whole, reprojects one onto the other's grid with GDAL's bilinear warp, sums the change in rasterised
-polygons and writes a compressed GeoTIFF: no uncertainty, no level of detection, no shares of cells, no report, no overviews. It is
-left out above 10,000 cells, where it would need 10 GB.
+polygons and writes a compressed GeoTIFF: no uncertainty, no level of detection, no shares of cells, no report, no overviews. It
+is left out above 10,000 cells, where it would need 10 GB.
 """
 
 from __future__ import annotations

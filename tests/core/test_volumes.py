@@ -128,11 +128,17 @@ class TestMeanTerms:
         zone = shapely.Point(300_016.3, 5_773_991.1).buffer(6.7)
         tally = Tally(zone.area)
         every = np.zeros((40, 60))
+        ringed = np.pad(before + change, 1, constant_values=np.nan)
         for first, width in ((0, 35), (35, 25)):
             window = grid.window(first, 0, width, 40)
             part = np.s_[:, first : first + width]
             row, column, shares = cell_shares(zone, window)
-            tally.add(Cells(window, first, 60, change[part], None, None, before[part]), row, column, shares)
+            tally.add(
+                Cells(window, first, 60, change[part], None, None, before[part], ringed[:, first : first + width + 2]),
+                row,
+                column,
+                shares,
+            )
             every[part][row : row + shares.shape[0], column : column + shares.shape[1]] = shares
         sizes = np.array([0.01, 1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6])
         root = sizes[:, None] * random.standard_normal((7, 7))
