@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numba
@@ -14,13 +15,29 @@ Array = NDArray[np.float64]
 _SAME = 2.0  # px: candidates closer than this to the best are the same feature (another orientation), not a rival
 
 
+@dataclass(frozen=True)
+class Prediction:
+    """Where features are expected in the other photograph (n, 2; infinite: nowhere), and how far around to look (n,), pixels."""
+
+    places: Array
+    reach: Array
+
+
+def by_homography(features: Features, homography: Array, reach: float) -> Prediction:
+    """Return where a homography (3, 3) puts features, with one reach (pixels) for all."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mapped = features.xy.astype(np.float64) @ homography[:, :2].T + homography[:, 2]
+        places = np.where(mapped[:, 2:] > 0, mapped[:, :2] / mapped[:, 2:], np.inf)
+    return Prediction(places, np.full(len(features), reach))
+
+
 def guided_matches(
     first: Features,
     second: Features,
-    homography: Array,
+    forward: Prediction,
+    backward: Prediction,
     fundamental: Array | None,
     *,
-    reach: float,
     band: float,
     turn: float,
     zoom: float,
@@ -29,26 +46,24 @@ def guided_matches(
 ) -> NDArray[np.int32]:
     """Return the mutual best matches (m, 2) of two photographs whose relative geometry is known roughly.
 
-    A candidate lies within ``reach`` pixels of ``homography`` (3, 3, second from first) and within ``band`` pixels of the line of
-    ``fundamental`` (3, 3; ``x2' F x1 = 0``; None for no such test); it is turned by ``turn`` (radians) and zoomed by ``zoom``
-    against the first, to 30 degrees and a factor of 1.6. ``ratio`` limits the distance of the descriptors against that of the
-    second best candidate, ``least`` their product (1 for equal ones).
+    A candidate lies where ``forward`` expects the feature of the first in the second, ``backward`` that of the second in the
+    first, and within ``band`` pixels of the line of ``fundamental`` (3, 3; ``x2' F x1 = 0``; None for no such test); it is turned
+    by ``turn`` (radians) and zoomed by ``zoom`` against the first, to 30 degrees and a factor of 1.6. ``ratio`` limits the
+    distance of the descriptors against that of the second best candidate, ``least`` their product (1 for equal ones).
     """
-    forward = _best(first, second, homography, fundamental, reach, band, turn, zoom, ratio, least)
+    there = _best(first, second, forward, fundamental, band, turn, zoom, ratio, least)
     transposed = None if fundamental is None else fundamental.T
-    back_from = np.asarray(np.linalg.inv(homography), np.float64)
-    backward = _best(second, first, back_from, transposed, reach / max(zoom, 1e-6), band, -turn, 1 / zoom, ratio, least)
-    index = np.flatnonzero(forward >= 0)
-    index = index[backward[forward[index]] == index]
-    return np.column_stack([index, forward[index]]).astype(np.int32)
+    back = _best(second, first, backward, transposed, band, -turn, 1 / zoom, ratio, least)
+    index = np.flatnonzero(there >= 0)
+    index = index[back[there[index]] == index]
+    return np.column_stack([index, there[index]]).astype(np.int32)
 
 
 def _best(
     source: Features,
     target: Features,
-    homography: Array,
+    expected: Prediction,
     fundamental: Array | None,
-    reach: float,
     band: float,
     turn: float,
     zoom: float,
@@ -56,15 +71,11 @@ def _best(
     least: float,
 ) -> NDArray[np.int32]:
     """Return for each source feature the index of its best target feature, -1 for none."""
-    ones = np.column_stack([source.xy.astype(np.float64), np.ones(len(source))])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        mapped = ones @ homography.T
-        predicted = np.where(mapped[:, 2:] > 0, mapped[:, :2] / mapped[:, 2:], np.inf)
-    lines = np.zeros_like(ones)
+    lines = np.zeros((len(source), 3))
     if fundamental is not None:
-        lines = ones @ fundamental.T
+        lines = source.xy.astype(np.float64) @ fundamental[:, :2].T + fundamental[:, 2]
         lines /= np.maximum(np.hypot(lines[:, 0], lines[:, 1]), 1e-300)[:, None]
-    cell = max(reach, 8.0)
+    cell = max(float(np.median(expected.reach)), 8.0) if len(source) else 8.0
     columns = int(target.xy[:, 0].max() // cell) + 1
     rows = int(target.xy[:, 1].max() // cell) + 1
     cells = (target.xy // np.float32(cell)).astype(np.int64)
@@ -73,9 +84,9 @@ def _best(
     starts = np.searchsorted(index[order], np.arange(columns * rows + 1))
     return np.asarray(
         _search(
-            predicted, lines, source.scale * zoom, source.angle + turn, source.descriptors,
+            expected.places, expected.reach, lines, source.scale * zoom, source.angle + turn, source.descriptors,
             target.xy, target.scale, target.angle, target.descriptors,
-            order, starts, columns, rows, cell, reach, band, ratio**2, least,
+            order, starts, columns, rows, cell, band, ratio**2, least,
         )
     )  # fmt: skip
 
@@ -92,6 +103,7 @@ def _product(first: Any, second: Any) -> Any:
 @numba.njit(cache=True, nogil=True)
 def _search(
     predicted: Any,
+    reaches: Any,
     lines: Any,
     scale1: Any,
     angle1: Any,
@@ -105,7 +117,6 @@ def _search(
     columns: int,
     rows: int,
     cell: float,
-    reach: float,
     band: float,
     ratio2: float,
     least: float,
@@ -116,6 +127,7 @@ def _search(
     score = np.empty(len(xy2), np.int64)
     for i in range(len(predicted)):
         x, y = predicted[i]
+        reach = reaches[i]
         if not (-reach < x < columns * cell + reach and -reach < y < rows * cell + reach):
             continue
         found, best, top = 0, -1, -1

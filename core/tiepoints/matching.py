@@ -8,7 +8,7 @@ rest are compared only where that geometry allows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..files import whole
 from .features import Features, spread
-from .guided import guided_matches
+from .guided import Prediction, by_homography, guided_matches
+from .motion import by_neighbours
 
 Array = NDArray[np.float64]
 
-VERSION = 3  # part of the key under which matches are kept
+VERSION = 4  # part of the key under which matches are kept
 LIMIT = 4.0 / 2000.0  # a verified match is this near its epipolar line (or homography), as a share of the longer side
 LEAST = 15  # verified matches below which a pair is not one
 _COARSE = 3000
@@ -100,24 +101,41 @@ def _match_all(
         mapped = cv2.perspectiveTransform(first.xy[kept[:, 0]][None], geometry.homography)[0]
         off = np.hypot(*(mapped - second.xy[kept[:, 1]]).T)
         reach = float(np.clip(1.5 * np.quantile(off, 0.98), 2 * LIMIT * longer, 0.1 * longer))
-    guided = guided_matches(
-        first,
-        second,
-        geometry.homography,
-        geometry.fundamental if geometry.fundamental.any() else None,
-        reach=reach,
-        band=LIMIT * longer,
-        turn=turn,
-        zoom=zoom,
-        ratio=_RATIO,
-        least=_PRODUCT,
-    )
-    # One place seen under two orientations is one match.
-    places = np.concatenate([first.xy[guided[:, 0]], second.xy[guided[:, 1]]], axis=1)
-    _, unique = np.unique(np.rint(places), axis=0, return_index=True)
-    found = guided[np.sort(unique)]
+    limits = {"band": LIMIT * longer, "turn": turn, "zoom": zoom, "ratio": _RATIO, "least": _PRODUCT}
+
+    def search(forward: Prediction, backward: Prediction, fundamental: Array | None) -> NDArray[np.int32]:
+        found = guided_matches(first, second, forward, backward, fundamental, **limits)
+        # One place seen under two orientations is one match.
+        places = np.concatenate([first.xy[found[:, 0]], second.xy[found[:, 1]]], axis=1)
+        _, unique = np.unique(np.rint(places), axis=0, return_index=True)
+        return found[np.sort(unique)]
+
+    there, back = geometry.homography, _inverse(geometry.homography)
+    lines = geometry.fundamental if geometry.fundamental.any() else None
+    found = search(by_homography(first, there, reach), by_homography(second, back, reach / max(zoom, 1e-6)), lines)
     verified = verify(first, second, cameras, found)
-    return verified if len(verified.matches) >= _SHARE * len(found) else PairMatches.none()
+    if len(verified.matches) < _SHARE * len(found):
+        return PairMatches.none()
+    if len(verified.matches) < LEAST or abs(np.linalg.det(verified.homography)) < 1e-9:
+        return verified
+    # What is verified tells how the ground moves around each feature: there all are sought again, and nowhere else.
+    there, back = verified.homography, _inverse(verified.homography)
+    one, two = _places(first, second, verified.matches)
+    forward = by_neighbours(first.xy, one, two, there, reach)
+    backward = by_neighbours(second.xy, two, one, back, reach / max(zoom, 1e-6))
+    found = search(forward, backward, None)
+    good = _agree(*_places(first, second, found), verified.fundamental, there, LIMIT * longer)
+    found = found[good]
+    return replace(verified, matches=found, likeness=_likeness(first, second, found)) if len(found) >= LEAST else verified
+
+
+def _inverse(homography: Array) -> Array:
+    return np.asarray(np.linalg.inv(homography), np.float64)
+
+
+def _places(first: Features, second: Features, matches: NDArray[np.int32]) -> tuple[Array, Array]:
+    """Return where matches (m, 2) lie in both photographs, (m, 2) each."""
+    return first.xy[matches[:, 0]].astype(np.float64), second.xy[matches[:, 1]].astype(np.float64)
 
 
 def coarse(features: Features, camera: Camera) -> NDArray[np.intp]:
@@ -145,7 +163,7 @@ def verify(first: Features, second: Features, cameras: tuple[Camera, Camera], ma
     if len(matches) < LEAST:
         return PairMatches.none()
     limit = LIMIT * max(*(max(c.width, c.height) for c in cameras))
-    one, two = (f.xy[k].astype(np.float64) for f, k in zip((first, second), matches.T, strict=True))
+    one, two = _places(first, second, matches)
     likeness = _likeness(first, second, matches)
     some = spread(first.xy[matches[:, 0]], likeness, (cameras[0].width, cameras[0].height), _SOME)
     options = pycolmap.TwoViewGeometryOptions()

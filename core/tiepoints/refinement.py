@@ -5,7 +5,7 @@ them is the reference, and the others move to where its surroundings are found a
 lies away from where it was detected, is not the same piece of ground, and leaves the track.
 
 Photographs are handled one at a time: first the patches around the references in each are cut out, then each photograph is
-searched for the patches of others.
+searched for the patches of others. Of what two photographs share, each keypoint must then move as those around it do.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from ..progress import Progress
 from .features import read_features
 from .images import SearchedImage
 from .leastsquares import cut_patches, holds_patch, match_patches
+from .motion import consistent
 from .pairs import Pair
 from .tracks import within_tracks
 
@@ -31,8 +32,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 Run = Callable[[Callable[..., None], Iterable[tuple[Any, ...]], int, Progress], None]
 
-VERSION = 1  # part of the key under which refined places are kept
-_ALIKE = 0.7  # correlation of a keypoint's surroundings with the reference's below which they are not the same
+VERSION = 2  # part of the key under which refined places are kept
+_ALIKE = (0.6, 0.7)  # bounds of the correlation of a keypoint's surroundings with the reference's below which they differ
+_EXPECTED = 0.75  # of the correlation that noise leaves the surroundings of most: that limit, within the bounds
 _MOVED = 2.5  # pixels between a detected place and the refined one, beyond which that is another
 _PLANE = 12  # keypoints two photographs must share for a homography to tell how patches are warped between them
 _RELIEF = 0.02  # of the longer side: what relief moves keypoints against that homography
@@ -170,6 +172,15 @@ def affinities(first: NDArray[np.float32], second: NDArray[np.float32], longer: 
     return result
 
 
+def _least_alike(correlation: NDArray[np.float32]) -> float:
+    """Return the correlation (n,) below which surroundings are not the same, by what is usual between two photographs.
+
+    Two looks at one patch, of signal S and noise N each, correlate by S / (S + N).
+    """
+    found = correlation[np.isfinite(correlation)]
+    return float(np.clip(_EXPECTED * np.median(found), *_ALIKE)) if len(found) else _ALIKE[1]
+
+
 def _working_keypoints(source: Source) -> NDArray[np.float32]:
     """Return keypoints (n, 4) in pixels of the image searched."""
     keypoints = read_features(source.features).keypoints()
@@ -192,7 +203,8 @@ def _search_references(source: Source, own: Indices, parts: Sequence[tuple[str, 
     ``parts`` names for each other photograph the file of its patches, the keypoints to be moved, and the rows of their patches.
     """
     keypoints = _working_keypoints(source)
-    kept, places = [own], [keypoints[own, :2]]
+    kept: list[NDArray[np.integer]] = [own]
+    places: list[NDArray[np.floating]] = [keypoints[own, :2]]
     image = source.image.read_reduced() if parts else np.zeros((1, 1), np.uint8)
     for name, index, rows in parts:
         with np.load(name, allow_pickle=False) as data:
@@ -201,7 +213,9 @@ def _search_references(source: Source, own: Indices, parts: Sequence[tuple[str, 
         warp = affinities(theirs, mine, max(image.shape))
         place, correlation = match_patches(image, patches, theirs[:, :2].astype(np.float64), warp, mine[:, :2])
         with np.errstate(invalid="ignore"):
-            good = (correlation >= _ALIKE) & (np.linalg.norm(place - mine[:, :2], axis=1) <= _MOVED)
+            found = (correlation >= _least_alike(correlation)) & (np.linalg.norm(place - mine[:, :2], axis=1) <= _MOVED)
+        good = np.flatnonzero(found)
+        good = good[consistent(theirs[good, :2].astype(np.float64), place[good])]
         kept.append(index[good])
         places.append(place[good])
     with whole(Path(path)) as part, part.open("wb") as stream:

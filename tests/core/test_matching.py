@@ -10,7 +10,7 @@ from strandline.core.camera import Camera
 from strandline.core.photographs.enhancement import enhance_photograph
 from strandline.core.photographs.reading import channel_sum
 from strandline.core.tiepoints.features import Features, detect
-from strandline.core.tiepoints.guided import guided_matches
+from strandline.core.tiepoints.guided import by_homography, guided_matches
 from strandline.core.tiepoints.matching import LEAST, match_pair, match_predicted, mutual_matches, read_matches, write_matches
 from strandline.core.tiepoints.thinning import thinned
 
@@ -32,37 +32,44 @@ def one_hot(*bins):
     return result
 
 
-GUIDE = {"reach": 20.0, "band": 3.0, "turn": 0.0, "zoom": 1.0, "ratio": 0.8, "least": 0.8}
+GUIDE = {"band": 3.0, "turn": 0.0, "zoom": 1.0, "ratio": 0.8, "least": 0.8}
 SHIFT = np.array([[1.0, 0, 100], [0, 1.0, 0], [0, 0, 1.0]])
 ROWS = np.array([[0.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # equal rows: the epipolar lines of a shift along x
+
+
+def guided(first, second, lines, homography=SHIFT, reach=20.0, **other):
+    """Return guided matches where one homography predicts all."""
+    back = np.linalg.inv(homography)
+    predicted = by_homography(first, homography, reach), by_homography(second, back, reach)
+    return guided_matches(first, second, *predicted, lines, **GUIDE | other)
 
 
 def test_only_candidates_near_the_prediction_and_the_line_count():
     first = features([[50, 50], [50, 150], [50, 250], [50, 350]], one_hot(0, 1, 2, 3))
     second = features([[152, 51], [175, 150], [155, 254], [150, 350]], one_hot(0, 1, 2, 4))
     # The second is beyond reach, the third off its line, the fourth looks different.
-    assert guided_matches(first, second, SHIFT, ROWS, **GUIDE).tolist() == [[0, 0]]
-    assert guided_matches(first, second, SHIFT, None, **GUIDE).tolist() == [[0, 0], [2, 2]]
+    assert guided(first, second, ROWS).tolist() == [[0, 0]]
+    assert guided(first, second, None).tolist() == [[0, 0], [2, 2]]
 
 
 def test_a_rival_nearby_makes_it_ambiguous_but_not_another_orientation_nor_one_elsewhere():
     first = features([[50, 50]], one_hot(0))
     near, same, far = [152, 50], [150.5, 50], [400, 50]
-    assert len(guided_matches(first, features([[150, 50], near], one_hot(0, 0)), SHIFT, ROWS, **GUIDE | {"ratio": 0.8})) == 1
+    assert len(guided(first, features([[150, 50], near], one_hot(0, 0)), ROWS, ratio=0.8)) == 1
     rival = features([[150, 50], [155, 50]], one_hot(0, 0))
     rival.descriptors[:, 0] = 240  # not quite equal to the first
-    assert len(guided_matches(first, rival, SHIFT, ROWS, **GUIDE)) == 0
+    assert len(guided(first, rival, ROWS)) == 0
     for other in (same, far):
         harmless = features([[150, 50], other], rival.descriptors)
-        assert len(guided_matches(first, harmless, SHIFT, ROWS, **GUIDE)) == 1
+        assert len(guided(first, harmless, ROWS)) == 1
 
 
 def test_turn_and_zoom_are_checked_around_the_circle():
     first = features([[50, 50]], one_hot(0), angle=np.radians(175))
     turned = features([[150, 50]], one_hot(0), scale=3.0, angle=np.radians(-175))
-    assert len(guided_matches(first, turned, SHIFT, ROWS, **GUIDE)) == 1  # 10 degrees and a factor of 1.5
-    assert len(guided_matches(first, turned, SHIFT, ROWS, **GUIDE | {"turn": np.radians(-60)})) == 0
-    assert len(guided_matches(first, turned, SHIFT, ROWS, **GUIDE | {"zoom": 0.9})) == 0
+    assert len(guided(first, turned, ROWS)) == 1  # 10 degrees and a factor of 1.5
+    assert len(guided(first, turned, ROWS, turn=np.radians(-60))) == 0
+    assert len(guided(first, turned, ROWS, zoom=0.9)) == 0
 
 
 def test_mutual_matches_by_hand():
