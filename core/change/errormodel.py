@@ -51,8 +51,7 @@ def height_error(
     else:
         assert level is not None
         known = from_stable(ground, level, zones, steps, progress)
-    # Without georeferencings a tilt that chance may explain stays in, and its uncertainty in the sigma.
-    shift = applied or (level if prior is None and not known.taken and level is not None else known.shift)
+    shift = applied or known.shift
     if method is not None and known.exceeded_by(shift):
         progress.warn(
             f"COREGISTER={method} leaves an error that STABLE shows ({known.shift.describe()}): "

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.special import chdtrc, fdtrc
+from scipy.special import chdtrc
 
 from ..progress import Progress
 from .coregistration import Shift, nmad, robust_fit
@@ -27,7 +27,6 @@ from .zones import Zone
 
 Array = NDArray[np.float64]
 _THIN = 0.02  # share of its length that stable ground must be wide to carry a tilt across
-_CHANCE = 0.001  # without georeferencings, a tilt is taken off when chance, which a fitted plane flatters, shows one more rarely
 _CONFLICT = 0.001  # stable ground and georeferencings contradict each other when chance would part them so more rarely
 _SURE = 1e-9  # share of the largest variance below which another is none
 _EXACT = 1e-12  # m2; noise is not less, so that models without any can be compared too
@@ -40,7 +39,7 @@ class HeightError:
 
     ``stable`` is the plane of stable ground with its covariance (3, 3), ``prior`` the georeferencings' covariance (7, 7).
     ``covariance`` is None when it is not known. ``free`` says that a tilt is neither known nor in the covariance, ``bends`` that
-    both georeferencings know how far they may be bent, ``taken`` that its shift is worth taking off, and not its level alone.
+    both georeferencings know how far they may be bent.
     """
 
     shift: Shift
@@ -49,7 +48,6 @@ class HeightError:
     prior: Array | None = None
     free: bool = False
     bends: bool = False
-    taken: bool = True
 
     def left_by(self, applied: Shift) -> tuple[float, ...]:
         """Return the coefficients (p,) of what is expected to remain when ``applied`` is taken off; none for its own shift."""
@@ -116,37 +114,23 @@ def from_both(ground: Stable, prior: Georeferenced, steps: tuple[float, float], 
 
 
 def from_stable(ground: Stable, level: Shift, zones: list[Zone], steps: tuple[float, float], progress: Progress) -> HeightError:
-    """Return what stable ground alone tells: a plane when its tilt is significant, else the ``level`` fitted to it.
+    """Return what stable ground alone tells: a plane as far as it carries one, else the ``level`` fitted to it.
 
-    The test is Fisher's, with the effective number of cells. A tilt that is not significant is not taken off, but what stable
-    ground says of it stays known, and counts. ``free`` says that ground on one line tells nothing of the tilt across.
+    A tilt is taken off whether it is significant or not. Leaving in one that is not, and counting what it may be, is wrong both
+    ways: without a tilt the sigma is too large, and just below significance the tilt is several times it. ``free`` says that
+    ground on one line tells nothing of the tilt across.
     """
     centre = _centre(ground)
     seen = _observe(ground, centre, None, steps)
-    tilts = seen.tilts
-    left = seen.samples - 1.0 - tilts
-    if tilts and left > 0:
-        ratio = float(seen.values[1:] @ np.linalg.solve(seen.covariance[1:, 1:], seen.values[1:])) / tilts
-        if fdtrc(tilts, left, ratio) < _CHANCE:
-            plane, covariance = _plane(seen, centre)
-            told = f"STABLE shows a tilt between the models that chance does not explain ({plane.describe()})"
-            progress.info(f"{told}.")
-            if tilts == 2:
-                return HeightError(plane, covariance, (plane, covariance))
-            progress.warn(f"{told}, but lies on one line: the tilt across it is not known, and NET_SIGMA leaves it out.")
-            return HeightError(plane, covariance, (plane, covariance), free=True)
-    variogram = _variogram(ground, level, steps)
-    if variogram is None:
+    if _variogram(ground, level, steps) is None:
         return HeightError(level, None, free=True)
     plane, covariance = _plane(seen, centre)
-    if tilts == 0:
-        plane, covariance = level, _covariance(ground, np.ones((len(ground.x), 1)), variogram)
-    error = HeightError(plane, covariance, _plane(seen, centre), free=tilts < 2, taken=False)
+    error = HeightError(plane if seen.tilts else level, covariance, (plane, covariance), free=seen.tilts < 2)
     axis = _unseen(seen, centre, zones)
     if axis is None:
         return error
     told = f"STABLE does not reach far enough {axis} to tell a tilt of one model against the other in that direction"
-    if tilts < 2:
+    if error.free:
         progress.warn(f"{told}: NET_SIGMA leaves it out unless REGISTRATION_SIGMA is given; add stable ground there.")
     else:
         progress.warn(f"{told}, which makes NET_SIGMA large: add stable ground there.")
