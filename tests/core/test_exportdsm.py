@@ -334,7 +334,7 @@ def test_the_report_stands_and_is_self_contained(scene, surface):
     page = (scene.folder / "report" / "exportdsm.html").read_text()
     assert page == (out / "report.html").read_text()
     assert page.count("data:image") >= 5
-    assert "http" not in page.split("<body>")[1].replace("http://www.w3.org", "")
+    assert "://" not in page.split("<body>")[1].replace("http://www.w3.org", "")
 
 
 def test_a_second_run_under_the_same_parameters_is_at_once(scene, surface, monkeypatch):

@@ -260,4 +260,4 @@ def test_the_report_stands_alone(beach, tmp_path, progress):
     text = page.read_text()
     assert "From 2020-01-01 to 2021-01-01 the beach changed by +7.10 +- " in text
     assert text.count("data:image/png;base64") == 2
-    assert "http" not in text
+    assert "://" not in text
