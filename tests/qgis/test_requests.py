@@ -339,7 +339,9 @@ def test_the_engines_layer_becomes_the_sink_with_fields_and_crs(fake_engine, qgi
     assert feature["name"] == "a.jpg"
     assert feature["n"] == 12
     assert not feature["height"]
-    assert feature.geometry().asWkt() == "PointZ (500000 5000000 60.5)"
+    point = feature.geometry().constGet()  # whose WKT differs between releases of QGIS
+    assert point.is3D()
+    assert (point.x(), point.y(), point.z()) == (500000, 5000000, 60.5)
 
 
 def test_a_number_that_is_not_determined_is_none(fake_engine, qgis, survey):
