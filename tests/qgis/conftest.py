@@ -95,7 +95,7 @@ def qgis_process(tmp_path_factory):
                 env={**environment, "TMPDIR": tempfile.gettempdir(), **more},
                 capture_output=True,
                 text=True,
-                timeout=300,
+                timeout=900,
                 check=False,
             )
             return told.returncode, told.stdout, told.stderr
