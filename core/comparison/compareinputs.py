@@ -14,6 +14,7 @@ from ..contract import VectorSource
 from ..errors import InputError
 from ..files import remove, scratch
 from ..orientation import georeference
+from ..orientation.inputs import GroundRequest
 from ..photographs.enhance import check_window
 from ..progress import SILENT, Progress
 from ..tiepoints.tiepoints import CACHE, check_limits
@@ -31,33 +32,15 @@ CASES = (("JPG", False, False), ("RAW", True, False), ("CeJPG", False, True), ("
 
 
 @dataclass(frozen=True)
-class Request:
-    """Ground control as in ``georeference``; ``marks_raw`` are marks in the RAW. ``method`` is that of ``enhance``.
+class Request(GroundRequest):
+    """``marks_raw`` are marks in the RAW. ``method`` is that of ``enhance``.
 
     ``surveys`` is a folder to keep the surveys of the cases in, and to go on from; ``table`` is a GeoPackage to write.
     """
 
     jpg: str
     raw: str | None = None
-    gcps: VectorSource | None = None
-    name_field: str | None = None
-    height_field: str | None = None
-    role_field: str | None = None
-    sigma_h: float = 0.01
-    sigma_v: float = 0.02
-    sigma_h_field: str | None = None
-    sigma_v_field: str | None = None
-    marks: VectorSource | None = None
     marks_raw: VectorSource | None = None
-    gcp_file: str | None = None
-    check: str | None = None
-    sigma_mark: float = 0.5
-    use_gnss: bool = True
-    lever_arm: str | None = None
-    gcp_heights: Literal["ellipsoidal", "orthometric", "unknown"] = "unknown"
-    gnss_heights: Literal["ellipsoidal", "orthometric", "unknown"] = "unknown"
-    geoid: str | None = None
-    crs: str | None = None
     method: Literal["arctan", "micmac", "equalize", "bandpass"] = "bandpass"
     window: int = 101
     max_size: int = 0
@@ -148,8 +131,7 @@ def _row(outcome: Outcome) -> dict[str, Any]:
 
 def _control(request: Request) -> georeference.Request | None:
     """Return what georeferencing is to be asked in each case, None without ground control."""
-    shared = {f.name for f in fields(georeference.Request)} & {f.name for f in fields(Request)}
-    given = {key: getattr(request, key) for key in shared - {"method", "output_html_file"}}
+    given = {f.name: getattr(request, f.name) for f in fields(GroundRequest)}
     control = georeference.Request("", method="similarity", **given)  # as in the paper: it changes no shape
     georeference.check_parameters(control)
     if request.gcps is None and request.gcp_file is None:

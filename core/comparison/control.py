@@ -81,7 +81,7 @@ def check(request: georeference.Request, survey: Survey) -> None:
     views = [View(p.name, provisional_camera(p), np.eye(3), np.zeros(3)) for p in survey.photographs]
     nothing = np.zeros(0, np.int32)
     block = Block(tuple(views), np.zeros((0, 3)), np.zeros(0), nothing, nothing, nothing)
-    inputs = gather(request, survey, read_given(request), block)
+    inputs = gather(request, None, survey, read_given(request), block)
     _enough(inputs)
     _near(inputs)
 

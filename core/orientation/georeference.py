@@ -27,7 +27,7 @@ from .calibration import interiors_of
 from .domes import dome_of
 from .findings import findings, verdict
 from .ignoring import outside
-from .inputs import Inputs, gather, read_given
+from .inputs import GroundRequest, Inputs, gather, read_given
 from .leaving import complete, georef_of, write_georeferenced
 from .observations import Seen, find_marks
 from .pointcloud import check_cloud
@@ -42,35 +42,12 @@ VERSION = 2  # raise it when the same input would give another result
 
 
 @dataclass(frozen=True)
-class Request:
-    """Sigmas in metres (``sigma_mark`` in pixels); ``residuals`` and ``photos`` are GeoPackages, ``tie_points`` a LAZ to write.
-
-    ``marks`` has the columns gcp, image, x, y: pixels from the CORNER of the top-left pixel (ODM's file counts from its
-    centre and is brought to that). ``check`` is names separated by commas; ``lever_arm`` three numbers from the projection
-    centre to the antenna (right, forward, up; m); ``geoid`` the path of a raster or a number (m).
-    """
+class Request(GroundRequest):
+    """``residuals`` and ``photos`` are GeoPackages, ``tie_points`` a LAZ to write."""
 
     survey: str
-    gcps: VectorSource | None = None
-    name_field: str | None = None
-    height_field: str | None = None
-    role_field: str | None = None
-    sigma_h: float = 0.01
-    sigma_v: float = 0.02
-    sigma_h_field: str | None = None
-    sigma_v_field: str | None = None
-    marks: VectorSource | None = None
-    gcp_file: str | None = None
-    check: str | None = None
-    sigma_mark: float = 0.5
     method: Literal["adjustment", "similarity"] = "adjustment"
-    use_gnss: bool = True
-    lever_arm: str | None = None
-    gcp_heights: Literal["ellipsoidal", "orthometric", "unknown"] = "unknown"
-    gnss_heights: Literal["ellipsoidal", "orthometric", "unknown"] = "unknown"
-    geoid: str | None = None
     ignore: VectorSource | None = None
-    crs: str | None = None
     residuals: str | None = None
     photos: str | None = None
     tie_points: str | None = None
@@ -119,7 +96,7 @@ def run(request: Request, progress: Progress = SILENT) -> Result:
         model = read_model(survey.folder / "model")
         block = block_from_model(model)
         progress.at(0.3)
-        inputs = gather(request, survey, given, block)
+        inputs = gather(request, request.ignore, survey, given, block)
         fingerprint = _fingerprint(request, inputs, oriented.fingerprint)
         solution = _solve(block, inputs, request)
         usable = np.ones(len(block.points), bool)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from ..block import Block
+from ..contract import VectorSource
 from ..errors import InputError
 from ..frames import projected_crs
 from ..survey import Survey
@@ -20,8 +21,34 @@ from .gnss import Gnss, gnss_of
 from .heights import HeightPlan, Kind, kind_of_crs, plan_heights, stated_kind, undulation, undulation_of_crs
 from .plausible import check_unit, level_of, refuse_absurd
 
-if TYPE_CHECKING:
-    from .georeference import Request
+
+@dataclass(frozen=True, kw_only=True)
+class GroundRequest:
+    """What a step asks of the ground and of GNSS. Sigmas in metres, ``sigma_mark`` in pixels.
+
+    ``marks`` has the columns gcp, image, x, y: pixels from the CORNER of the top-left pixel (ODM's file counts from its
+    centre and is brought to that). ``check`` is names separated by commas; ``lever_arm`` three numbers from the projection
+    centre to the antenna (right, forward, up; m); ``geoid`` the path of a raster or a number (m).
+    """
+
+    gcps: VectorSource | None = None
+    name_field: str | None = None
+    height_field: str | None = None
+    role_field: str | None = None
+    sigma_h: float = 0.01
+    sigma_v: float = 0.02
+    sigma_h_field: str | None = None
+    sigma_v_field: str | None = None
+    marks: VectorSource | None = None
+    gcp_file: str | None = None
+    check: str | None = None
+    sigma_mark: float = 0.5
+    use_gnss: bool = True
+    lever_arm: str | None = None
+    gcp_heights: Literal["ellipsoidal", "orthometric", "unknown"] = "unknown"
+    gnss_heights: Literal["ellipsoidal", "orthometric", "unknown"] = "unknown"
+    geoid: str | None = None
+    crs: str | None = None
 
 
 @dataclass(frozen=True)
@@ -40,7 +67,7 @@ class Inputs:
     ignore: shapely.Geometry | None = None
 
 
-def read_given(request: Request) -> Given | None:
+def read_given(request: GroundRequest) -> Given | None:
     """Read the control as it was given, None for none.
 
     Raises
@@ -63,8 +90,8 @@ def read_given(request: Request) -> Given | None:
     )
 
 
-def gather(request: Request, survey: Survey, given: Given | None, block: Block) -> Inputs:
-    """Bring control and positions into the survey's CRS, with heights of one kind.
+def gather(request: GroundRequest, ignore: VectorSource | None, survey: Survey, given: Given | None, block: Block) -> Inputs:
+    """Bring control, positions and the polygons to ignore into the survey's CRS, with heights of one kind.
 
     Raises
     ------
@@ -90,12 +117,12 @@ def gather(request: Request, survey: Survey, given: Given | None, block: Block) 
     if plan.comparable:
         plan, told = _compared(plan, (stated, request.gnss_heights), control, gnss, block, survey)
         warnings += told
-    ignore = shapely.union_all(polygons(request.ignore, crs)) if request.ignore is not None else None
-    return Inputs(crs, control, gnss, plan, _focal_change(survey, block), tuple(warnings), ignore)
+    ignored = shapely.union_all(polygons(ignore, crs)) if ignore is not None else None
+    return Inputs(crs, control, gnss, plan, _focal_change(survey, block), tuple(warnings), ignored)
 
 
 def _levelled(
-    request: Request, given: Given | None, stated: Kind, control: Control, gnss: Gnss, crs: str
+    request: GroundRequest, given: Given | None, stated: Kind, control: Control, gnss: Gnss, crs: str
 ) -> tuple[HeightPlan, Gnss, list[str]]:
     """Bring GNSS heights to the GCPs' kind, by GEOID or by the grid of the GCPs' vertical CRS."""
     geoid, why = request.geoid, ""
@@ -164,7 +191,7 @@ def _focal_change(survey: Survey, block: Block) -> float:
     return float(np.median(changes)) if changes else 0.0
 
 
-def _crs(request: Request, survey: Survey, given: Given | None) -> str:
+def _crs(request: GroundRequest, survey: Survey, given: Given | None) -> str:
     for text in (request.crs, survey.crs):
         if text:
             return projected_crs(text).to_wkt()
